@@ -1,0 +1,50 @@
+//! Fences: the areas a vehicle may or may not fly in, whatever they were read from.
+//!
+//! A [`FenceSet`] is still geographic and unbuffered. Turning it into something a path can be
+//! tested against is [`crate::airspace`]'s work.
+
+use crate::geodesy::LatLon;
+use crate::units::Metres;
+
+/// On which side of its edge a region may be flown in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum FenceRole {
+    /// Only inside.
+    Inclusion,
+    /// Only outside: an obstacle or no-fly zone.
+    Exclusion,
+}
+
+/// The shape of a region.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FenceShape {
+    /// A ring of vertices, not closed (the last is joined to the first), in either winding.
+    Polygon(Vec<LatLon>),
+    /// A circle on the ground.
+    Circle {
+        /// Its centre.
+        centre: LatLon,
+        /// Its radius.
+        radius: Metres,
+    },
+}
+
+/// One region, and where it came from so that a message can name it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FenceRegion {
+    /// Inside or outside.
+    pub role: FenceRole,
+    /// Its outline.
+    pub shape: FenceShape,
+    /// What to call it in a message, such as `fence items 4-9` or `city.geojson feature 3`.
+    pub origin: String,
+}
+
+/// All regions that apply to a mission.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FenceSet {
+    /// The regions in the order they were read.
+    pub regions: Vec<FenceRegion>,
+    /// Where a vehicle that breached the fence goes back to, where one is set, with its altitude.
+    pub return_point: Option<(LatLon, f32)>,
+}
