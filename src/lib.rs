@@ -2,5 +2,6 @@
 
 pub mod fence;
 pub mod geodesy;
+pub mod link;
 pub mod mission;
 pub mod units;
