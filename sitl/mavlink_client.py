@@ -170,7 +170,7 @@ class Client:
     def download(self, mission_type=MISSION, retry_s=0.5, patience=20):
         """All items, asking again when an answer is lost."""
         answer = self._ask(lambda: self.request_list(mission_type), ("MISSION_COUNT", "MISSION_ACK"),
-                           lambda m: m.mission_type == mission_type, retry_s, patience)
+                           lambda m: m.mission_type == mission_type and getattr(m, "type", None) != 0, retry_s, patience)
         if answer.get_type() == "MISSION_ACK":
             raise Refusal(answer.type)
         items = []
@@ -192,12 +192,16 @@ class Client:
     def upload(self, items, mission_type=MISSION, timeout=PATIENCE_S):
         """Serves the items as they are asked for; returns the final MISSION_ACK or raises Refusal."""
         self.count(len(items), mission_type)
+        asked = False
         last_progress = time.monotonic()
         while time.monotonic() - last_progress < timeout:
-            message = self.receive("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK", timeout=1.0,
+            message = self.receive("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK", timeout=0.5,
                                    where=lambda m: m.mission_type == mission_type)
             if message is None:
+                if not asked:
+                    self.count(len(items), mission_type)  # lost, or still on its way
                 continue
+            asked = True
             last_progress = time.monotonic()
             if message.get_type() != "MISSION_ACK":
                 self.item(message.seq, items[message.seq], mission_type)

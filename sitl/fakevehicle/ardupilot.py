@@ -7,9 +7,10 @@ validated first. Downloads have no state: any item, any time, any order.
 
 from dataclasses import replace
 
-from .ardupilot_storage import Refused, home_item, store
+from .ardupilot_storage import home_item, store
 from .dialect import ALL, FENCE, MISSION, RALLY, TYPE_NAMES, mavlink
 from .fence_rules import fault_in, fence_total, only_few_circles
+from .items import Refused
 from .mission_server import MissionServer, Upload
 
 LABELS = {MISSION: "Mission", FENCE: "Fence", RALLY: "Rally"}

@@ -8,7 +8,7 @@ import math
 from dataclasses import replace
 
 from .dialect import FENCE, MISSION, RALLY, f32, mavlink
-from .items import Item, RAW_XY_COMMANDS
+from .items import Item, RAW_XY_COMMANDS, Refused
 
 ALTITUDE_LIMIT_M = 83000.0
 FENCE_COMMANDS = range(5000, 5005)
@@ -16,14 +16,6 @@ FENCE_COMMANDS = range(5000, 5005)
 RELATIVE = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 TERRAIN = (mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT, mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT)
 ABSOLUTE = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
-
-
-class Refused(Exception):
-    """The item is not taken; `code` is the MAV_MISSION_RESULT of the acknowledgement."""
-
-    def __init__(self, code):
-        super().__init__(f"MAV_MISSION_RESULT {code}")
-        self.code = code
 
 
 def _drop(_value):

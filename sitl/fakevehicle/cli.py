@@ -3,19 +3,21 @@
 import argparse
 import asyncio
 import json
+import math
 import os
 import random
 import signal
 import sys
 
-from .ardupilot_storage import Refused
 from .control import COMMAND_HELP, CommandError, Controller, Script
 from .dialect import FENCE, MISSION, RALLY, TYPE_NAMES, TYPE_NUMBERS
 from .faults import FaultError, help_text
+from .items import Refused
 from .links import make_link
 from .persona import PERSONAS
 from .plan_files import PlanFileError, load_plan
 from .report import dump, write_json
+from .signing import Signing
 from .vehicle import Vehicle
 
 DESCRIPTION = """A fake ArduPilot or PX4 vehicle for testing MAVLink software.
@@ -58,6 +60,8 @@ def parser():
     add("--speedup", type=float, default=1.0, metavar="X", help="divide the mission protocol's time-outs by X")
     add("--fault", action="append", metavar="SPEC", default=[], help="misbehave, see below")
     add("--script", metavar="FILE", help="JSON commands with a time or an event, see below")
+    add("--signing-key", metavar="FILE", help="sign with this key (32 bytes, or 64 hex digits) and demand signatures")
+    add("--accept-unsigned", action="store_true", help="with --signing-key: take unsigned messages too")
     add("--seed", type=int, help="seed of everything random (default: chosen, and printed)")
     add("--dump", metavar="FILE", help="write everything it holds as JSON on exit and on SIGUSR1 ('-': stdout)")
     add("--control", metavar="PORT|unix:PATH", help="accept JSON commands there (TCP: localhost only, 0: any port)")
@@ -131,7 +135,7 @@ async def run(arguments):
         for link in links:
             await link.close()
         if controller.server:
-            await controller.close()
+            controller.close()
         if arguments.control and arguments.control.startswith("unix:") and os.path.exists(arguments.control[5:]):
             os.unlink(arguments.control[5:])
 
@@ -161,10 +165,14 @@ def make_vehicle(arguments):
         if held > most:
             complain(f"{TYPE_NAMES[mission_type]}: {held} items loaded, capacity raised from {most}")
             capacities[mission_type] = held
+    try:
+        signing = Signing.from_file(arguments.signing_key, arguments.accept_unsigned)
+    except (OSError, ValueError) as error:
+        raise UsageError(f"--signing-key {error}") from error
     seed = arguments.seed if arguments.seed is not None else random.SystemRandom().randrange(2**32)
     complain(f"seed {seed}")
     vehicle = Vehicle(persona, sysid=arguments.sysid, home=home, seed=seed, speedup=arguments.speedup,
-                      streams_hz=arguments.stream_rate, capacities=capacities)
+                      streams_hz=arguments.stream_rate, capacities=capacities, signing=signing)
     for mission_type, items in plans.items():
         try:
             vehicle.load(mission_type, items)
@@ -192,7 +200,7 @@ def _home(text):
         lat, lon, alt = (float(part) for part in text.split(","))
     except ValueError as error:
         raise UsageError(f"--home {text!r} is not LAT,LON,ALT") from error
-    if not (abs(lat) <= 90 and abs(lon) <= 180):
+    if not (abs(lat) <= 90 and abs(lon) <= 180 and math.isfinite(alt)):
         raise UsageError(f"--home {text!r} is not on this planet")
     return lat, lon, alt
 

@@ -6,11 +6,12 @@ A command is {"cmd": NAME, ...}; every answer is one JSON line with "ok". A scri
 
 import asyncio
 import json
+import math
 import os
 
-from .ardupilot_storage import Refused
 from .dialect import TYPE_NUMBERS
-from .items import Item
+from .ground_station import GroundStation
+from .items import Item, Refused
 from .plan_files import PlanFileError, load_plan
 from .report import dump
 
@@ -26,6 +27,9 @@ COMMAND_HELP = """control commands (--control, --script), one JSON object per li
   {"cmd": "clear-faults", "number": 2}   removes one fault, or all of them without a number
   {"cmd": "reboot", "for": 1.0}          down for that long
   {"cmd": "vanish"}                      silent for good
+  {"cmd": "gcs-upload", "type": "mission", "items": X, "pace": 0.05, "stop": 3}
+                                         another ground station (255/190) uploads X over the protocol, one item
+                                         per pace seconds, giving up silently after `stop` items if given
   {"cmd": "statustext", "text": "hello", "severity": 6}
   {"cmd": "quit"}
 
@@ -41,20 +45,21 @@ class CommandError(ValueError):
 class Controller:
     def __init__(self, vehicle, quit_event):
         self.vehicle, self.quit_event = vehicle, quit_event
-        self.server, self.tasks, self.writers = None, set(), set()
+        self.server, self.tasks = None, set()
 
     def execute(self, command):
         """Carries out one command and returns the answer; raises CommandError."""
         handler = {
             "dump": self._dump, "set": self._set, "fault": self._fault, "clear-faults": self._clear_faults,
-            "reboot": self._reboot, "vanish": self._vanish, "statustext": self._statustext, "quit": self._quit,
+            "reboot": self._reboot, "vanish": self._vanish, "statustext": self._statustext,
+            "gcs-upload": self._gcs_upload, "quit": self._quit,
         }.get(command.get("cmd"))
         if handler is None:
             raise CommandError(f"unknown cmd {command.get('cmd')!r}")
         try:
             return {"ok": True, **(handler(command) or {})}
         except Refused as refusal:
-            raise CommandError(f"item {getattr(refusal, 'index', '?')} refused: {refusal}") from refusal
+            raise CommandError(f"item {refusal.index} refused: {refusal}") from refusal
         except (ValueError, KeyError, TypeError, PlanFileError, OverflowError) as error:
             raise CommandError(f"{command.get('cmd')}: {error}") from error
 
@@ -95,6 +100,11 @@ class Controller:
     def _vanish(self, _command):
         self.vehicle.vanish()
 
+    def _gcs_upload(self, command):
+        mission_type = TYPE_NUMBERS[command.get("type", "mission")]
+        GroundStation(self.vehicle).upload(mission_type, _items(command["items"], mission_type),
+                                           float(command.get("pace", 0.05)), command.get("stop"))
+
     def _statustext(self, command):
         self.vehicle.statustext(int(command.get("severity", 6)), str(command["text"]))
 
@@ -109,24 +119,26 @@ class Controller:
             path = where[5:]
             if os.path.exists(path):
                 os.unlink(path)
-            self.server = await asyncio.start_unix_server(self._converse, path, limit=LONGEST_LINE)
+            self.server = await asyncio.start_unix_server(self._connected, path, limit=LONGEST_LINE)
             return {"unix": path}
-        self.server = await asyncio.start_server(self._converse, "127.0.0.1", int(where), limit=LONGEST_LINE)
+        self.server = await asyncio.start_server(self._connected, "127.0.0.1", int(where), limit=LONGEST_LINE)
         return {"port": self.server.sockets[0].getsockname()[1]}
 
-    async def close(self):
+    def close(self):
         self.server.close()
-        for writer in list(self.writers):
-            writer.close()
-        await asyncio.gather(*self.tasks, return_exceptions=True)
+        for task in self.tasks:
+            task.cancel()
+
+    def _connected(self, reader, writer):
+        task = self.vehicle.loop.create_task(self._converse(reader, writer))
+        self.tasks.add(task)
+        task.add_done_callback(self.tasks.discard)
 
     async def _converse(self, reader, writer):
-        self.tasks.add(asyncio.current_task())
-        self.writers.add(writer)
         try:
             while line := await reader.readline():
                 try:
-                    command = json.loads(line)
+                    command = _json(line)
                     if not isinstance(command, dict):
                         raise CommandError("a command is a JSON object")
                     answer = self.execute(command)
@@ -137,8 +149,6 @@ class Controller:
         except (OSError, ValueError):
             pass
         finally:
-            self.tasks.discard(asyncio.current_task())
-            self.writers.discard(writer)
             writer.close()
 
 
@@ -154,7 +164,7 @@ class Script:
                 if not line.strip() or line.lstrip().startswith("#"):
                     continue
                 try:
-                    command = json.loads(line)
+                    command = _json(line)
                     if not isinstance(command, dict) or ("at" in command) == ("on" in command):
                         raise ValueError('needs either "at" or "on"')
                     (self.timed if "at" in command else self.waiting).append((f"{path}:{number}", command))
@@ -191,8 +201,14 @@ def _items(source, mission_type):
     return [Item.from_json(fields) for fields in source]
 
 
+def _json(line):
+    def refuse(constant):
+        raise ValueError(f"{constant} is not JSON; write null for NaN")
+    return json.loads(line, parse_constant=refuse)
+
+
 def _place(values):
     lat, lon, alt = (float(value) for value in values)
-    if not (abs(lat) <= 90 and abs(lon) <= 180):
+    if not (abs(lat) <= 90 and abs(lon) <= 180 and math.isfinite(alt)):
         raise ValueError(f"not a place: {values}")
     return lat, lon, alt

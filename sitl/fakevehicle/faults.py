@@ -101,7 +101,11 @@ KINDS = {
                "restart at a time (at=S) or after an item went through (item=K): transfers, routes and stream rates "
                "are forgotten, storage is kept, silent for `for` seconds; close=1 also closes TCP connections"),
     "vanish": (PLANS, WHEN, "stop answering for good, at=S or after item=K"),
+    "second-gcs": (PLANS, {**WHEN, "count": (_whole, 5), "pace": (_seconds, 50.0), "stop": (_whole, None)},
+                   "another ground station (255/190) uploads count items of its own, one per pace ms, starting at=S "
+                   "or after item=K of your transfer; it gives up silently after `stop` items"),
 }
+ON_VEHICLE = ("reboot", "vanish", "second-gcs")
 ON_FRAMES = [kind for kind, (group, _, _) in KINDS.items() if group is FRAMES]
 
 
@@ -165,7 +169,7 @@ def parse_fault(spec):
             options[name] = keys[name][0](text)
         except ValueError as error:
             raise FaultError(f"fault {kind!r}: {name}={text}: {error}") from error
-    if kind in ("reboot", "vanish") and options["item"] is None and options["at"] is None:
+    if kind in ON_VEHICLE and options["item"] is None and options["at"] is None:
         raise FaultError(f"fault {kind!r} needs at=SECONDS or item=NUMBER")
     return Fault(kind, spec, options)
 
@@ -203,11 +207,14 @@ class Faults:
         """Removes one fault, or all."""
         self.faults = [fault for fault in self.faults if number is not None and fault.number != number]
 
-    def take(self, kind, mission_type=None, item=None, **facts):
-        """The first active fault of this kind that fits, counted as applied; None if there is none."""
+    def take(self, kind, mission_type=None, item=None, exact_item=False, **facts):
+        """The first active fault of this kind that fits, counted as applied; None if there is none.
+
+        A fault without item= fits every item, unless `exact_item`."""
         now = self.clock()
         for fault in self.faults:
             if (fault.kind == kind and fault.active(now) and fault.matches_plan(mission_type, item)
+                    and not (exact_item and fault.options["item"] is None)
                     and all(fault.options.get(name) == value for name, value in facts.items())):
                 fault.applied += 1
                 return fault

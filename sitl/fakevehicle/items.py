@@ -11,6 +11,15 @@ from .dialect import f32, mavlink
 RAW_XY_COMMANDS = {mavlink.MAV_CMD_DO_DIGICAM_CONFIGURE, mavlink.MAV_CMD_DO_DIGICAM_CONTROL}
 
 
+class Refused(Exception):
+    """The item is not taken; `code` is the MAV_MISSION_RESULT of the acknowledgement."""
+
+    def __init__(self, code):
+        super().__init__(f"MAV_MISSION_RESULT {code}")
+        self.code = code
+        self.index = None  # which item, where several are loaded at once
+
+
 @dataclass(frozen=True)
 class Item:
     """A mission, fence or rally item. `x`, `y` are integers: degrees x 1e7, or raw in frame 2."""

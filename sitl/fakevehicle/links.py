@@ -17,6 +17,7 @@ from .dialect import mavlink
 
 MOST_UDP_PEERS = 16
 SERIAL_QUEUE_BYTES = 256 * 1024
+SERIAL_CHUNK = 32
 
 
 class Wire:
@@ -43,12 +44,11 @@ class Wire:
 class Channel:
     """One conversation. `write` takes bytes; `vehicle` gets what comes in."""
 
-    def __init__(self, vehicle, link, name, write, always_on):
+    def __init__(self, vehicle, link, name, write):
         self.vehicle, self.link, self.name, self.write = vehicle, link, name, write
-        self.always_on = always_on  # sends before it heard anybody (udpout, tcp, serial)
         self.mav = mavlink.MAVLink(None, srcSystem=vehicle.sysid, srcComponent=mavlink.MAV_COMP_ID_AUTOPILOT1)
         self.mav.robust_parsing = True
-        vehicle.secure(self.mav)
+        vehicle.signing.secure(self.mav, link.number)
         self.heard = {}      # (system, component) -> time last heard
         self.intervals = {}  # message id -> timer, see telemetry
         self.incoming, self.outgoing = Wire(vehicle.loop), Wire(vehicle.loop)
@@ -118,8 +118,8 @@ class Link:
         """For the ready line: kind, where, and the URL with which to connect to it."""
         raise NotImplementedError
 
-    def close_connections(self):
-        """What a reboot does to connections, where there are any."""
+    def rebooted(self, close_connections):
+        """What a reboot of the vehicle does to the link."""
 
     async def close(self):
         pass
@@ -148,7 +148,7 @@ class UdpLink(Link, asyncio.DatagramProtocol):
             if len(self.channels) >= MOST_UDP_PEERS:
                 self.channels.pop(next(iter(self.channels))).close()
             name = f"{self.kind}:{self.host}:{self.port}" if address is None else f"udpin:{address[0]}:{address[1]}"
-            channel = Channel(self.vehicle, self, name, lambda data: self._write(data, address), address is None)
+            channel = Channel(self.vehicle, self, name, lambda data: self._write(data, address))
             self.channels[address] = channel
             self.vehicle.channel_opened(channel)
         return channel
@@ -162,6 +162,12 @@ class UdpLink(Link, asyncio.DatagramProtocol):
 
     def error_received(self, exc):
         pass  # nobody listens there yet
+
+    def rebooted(self, close_connections):
+        if self.kind == "udpin":  # the addresses of those who spoke were in memory
+            for channel in self.channels.values():
+                channel.close()
+            self.channels.clear()
 
     def describe(self):
         other = "udpout" if self.kind == "udpin" else "udpin"
@@ -179,14 +185,14 @@ class TcpLink(Link):
         super().__init__(vehicle, number)
         self.kind, self.host, self.port = kind, host, port
         self.writers, self.tasks = set(), set()
-        self.server = self.task = None
+        self.server = None
 
     async def open(self):
         if self.kind == "tcpin":
-            self.server = await asyncio.start_server(self._converse, self.host, self.port)
+            self.server = await asyncio.start_server(self._connected, self.host, self.port)
             self.port = self.server.sockets[0].getsockname()[1]
         else:
-            self.task = asyncio.create_task(self._connect_for_ever())
+            self.tasks.add(self.vehicle.loop.create_task(self._connect_for_ever()))
 
     async def _connect_for_ever(self):
         while True:
@@ -196,17 +202,21 @@ class TcpLink(Link):
                 pass
             await asyncio.sleep(0.5)
 
+    def _connected(self, reader, writer):
+        task = self.vehicle.loop.create_task(self._converse(reader, writer))
+        self.tasks.add(task)
+        task.add_done_callback(self.tasks.discard)
+
     async def _converse(self, reader, writer):
         remote = writer.get_extra_info("peername")
         self.writers.add(writer)
-        self.tasks.add(asyncio.current_task())
 
         def write(data):
             # A client that does not read is not worth memory: drop, as a full serial port would.
             if not writer.is_closing() and writer.transport.get_write_buffer_size() < SERIAL_QUEUE_BYTES:
                 writer.write(data)
 
-        channel = Channel(self.vehicle, self, f"{self.kind}:{remote[0]}:{remote[1]}", write, True)
+        channel = Channel(self.vehicle, self, f"{self.kind}:{remote[0]}:{remote[1]}", write)
         self.vehicle.channel_opened(channel)
         try:
             while data := await reader.read(4096):
@@ -216,7 +226,6 @@ class TcpLink(Link):
         finally:
             channel.close()
             self.writers.discard(writer)
-            self.tasks.discard(asyncio.current_task())
             writer.close()
 
     def describe(self):
@@ -224,17 +233,19 @@ class TcpLink(Link):
         host = _reachable(self.host) if self.kind == "tcpin" else self.host
         return {"kind": self.kind, "host": self.host, "port": self.port, "connect": f"{other}:{host}:{self.port}"}
 
-    def close_connections(self):
+    def rebooted(self, close_connections):
+        if close_connections:
+            self._close_connections()
+
+    def _close_connections(self):
         for writer in list(self.writers):
             writer.close()
 
     async def close(self):
         if self.server:
             self.server.close()
-        if self.task:
-            self.task.cancel()
-        self.close_connections()
-        await asyncio.gather(*self.tasks, return_exceptions=True)
+        for task in self.tasks:
+            task.cancel()
 
 
 class PtyLink(Link):
@@ -248,6 +259,7 @@ class PtyLink(Link):
         self.symlink, self.baud = path, baud
         self.queue, self.queued, self.writing = deque(), 0, False
         self.unread_before = self.written = 0
+        self.incoming_free = self.outgoing_free = 0.0
 
     async def open(self):
         # The slave stays open here too: its raw mode must not be lost when the peer closes it.
@@ -259,27 +271,34 @@ class PtyLink(Link):
             if os.path.islink(self.symlink):
                 os.unlink(self.symlink)
             os.symlink(self.path, self.symlink)
-        self.channel = Channel(self.vehicle, self, f"pty:{self.path}", self._write, True)
+        self.channel = Channel(self.vehicle, self, f"pty:{self.path}", self._write)
         self.vehicle.channel_opened(self.channel)
         self.vehicle.loop.add_reader(self.master, self._readable)
         self.vehicle.loop.call_later(1.0, self._flush_if_unread)
 
     def _readable(self):
         try:
-            data = os.read(self.master, 4096 if not self.baud else max(1, self.baud // 10 // 50))
+            data = os.read(self.master, 4096 if not self.baud else SERIAL_CHUNK)
         except (BlockingIOError, InterruptedError):
             return
         except OSError:
             self.vehicle.loop.remove_reader(self.master)
             return
-        if self.baud:
-            self.vehicle.loop.remove_reader(self.master)
-            self.vehicle.loop.call_later(len(data) * 10 / self.baud, self._read_again)
-        self.channel.receive(data)
+        if not self.baud:
+            self.channel.receive(data)
+            return
+        # The bytes are there when the last of them has crossed the line; meanwhile nothing is read.
+        self.vehicle.loop.remove_reader(self.master)
+        self.incoming_free = self._crossing_ends(self.incoming_free, len(data))
+        self.vehicle.loop.call_at(self.incoming_free, self._arrived, data)
 
-    def _read_again(self):
+    def _arrived(self, data):
         if self.master is not None:
             self.vehicle.loop.add_reader(self.master, self._readable)
+            self.channel.receive(data)
+
+    def _crossing_ends(self, line_free, size):
+        return max(self.vehicle.loop.time(), line_free) + size * 10 / self.baud
 
     def _write(self, data):
         if self.master is None or self.queued + len(data) > SERIAL_QUEUE_BYTES:
@@ -287,30 +306,39 @@ class PtyLink(Link):
         self.queue.append(data)
         self.queued += len(data)
         if not self.writing:
-            self._drain()
+            self._next_frame()
 
-    def _drain(self):
-        self.writing = False
-        while self.queue and self.master is not None:
-            data = self.queue.popleft()
-            chunk = data if not self.baud else data[: max(1, self.baud // 10 // 50)]
-            try:
-                written = os.write(self.master, chunk)
-            except (BlockingIOError, InterruptedError):
-                written = 0
-            except OSError:
-                self.queue.clear()
-                self.queued = 0
-                return
-            self.queued -= written
-            self.written += written
-            if written < len(data):
-                self.queue.appendleft(data[written:])
-            if written < len(chunk) or self.baud:
-                self.writing = True
-                pause = written * 10 / self.baud if self.baud and written else 0.005
-                self.vehicle.loop.call_later(pause, self._drain)
-                return
+    def _next_frame(self):
+        """Starts the frame at the head of the queue; it is written when it has crossed the line."""
+        self.writing = bool(self.queue)
+        if not self.writing:
+            return
+        if self.baud:
+            self.outgoing_free = self._crossing_ends(self.outgoing_free, len(self.queue[0]))
+            self.vehicle.loop.call_at(self.outgoing_free, self._put)
+        else:
+            self._put()
+
+    def _put(self):
+        if self.master is None or not self.queue:
+            self.writing = False
+            return
+        frame = self.queue.popleft()
+        try:
+            written = os.write(self.master, frame)
+        except (BlockingIOError, InterruptedError):
+            written = 0
+        except OSError:
+            written = len(frame)
+        self.queued -= written
+        self.written += written
+        if written < len(frame):  # the reader is slow: wait for room
+            self.queue.appendleft(frame[written:])
+            self.vehicle.loop.call_later(0.005, self._put)
+        elif self.queue and not self.baud:
+            self.vehicle.loop.call_soon(self._put)
+        else:
+            self._next_frame()
 
     def _flush_if_unread(self):
         """Nobody reads the other end: throw away what waits there, as a UART would have done."""

@@ -54,7 +54,7 @@ def _load_qgc_plan(path, text):
         mission = document.get("mission") or {}
         home = mission.get("plannedHomePosition")
         if home:
-            plan.home = (_latitude(home[0]), _longitude(home[1]), float(home[2]) if len(home) > 2 else 0.0)
+            plan.home = (_latitude(home[0]), _longitude(home[1]), _finite(home[2]) if len(home) > 2 else 0.0)
 
         simple = []  # (doJumpId or None, raw item)
         for index, entry in enumerate(mission.get("items") or []):
@@ -151,7 +151,7 @@ def _load_waypoints(path, text):
         except (ValueError, OverflowError) as error:
             raise PlanFileError(f"{path}:{number}: {error}") from error
         if seq == 0 and command == mavlink.MAV_CMD_NAV_WAYPOINT:
-            plan.home = (params[4], params[5], params[6])
+            plan.home = (params[4], params[5], _finite(params[6]))
         elif command in FENCE_COMMANDS:
             plan.items[FENCE].append(item)
         elif command == RALLY_COMMAND:
@@ -162,6 +162,12 @@ def _load_waypoints(path, text):
                 item = replace(item, params=(item.params[0] - first, *item.params[1:]))
             plan.items[MISSION].append(item)
     return plan
+
+
+def _finite(value):
+    if not math.isfinite(float(value)):
+        raise ValueError(f"{value} is not a finite number")
+    return float(value)
 
 
 def _latitude(value):

@@ -6,9 +6,8 @@ the first one at the end, at once. Content ids travel as `opaque_id`.
 
 from dataclasses import replace
 
-from .ardupilot_storage import Refused
 from .dialect import ALL, FENCE, MISSION, RALLY, TYPE_NAMES, mavlink
-from .items import items_id
+from .items import Refused, items_id
 from .mission_server import MissionServer, Upload
 from .px4_storage import store
 

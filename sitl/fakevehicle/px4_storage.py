@@ -7,9 +7,8 @@ Only frames 0, 3, 5, 6 (with a place) and 2 (without one), and only the commands
 import math
 from dataclasses import replace
 
-from .ardupilot_storage import Refused
 from .dialect import FENCE, MISSION, f32, mavlink
-from .items import Item
+from .items import Item, Refused
 
 RELATIVE = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 ABSOLUTE = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)

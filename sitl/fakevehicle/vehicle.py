@@ -4,20 +4,23 @@ import asyncio
 
 from .ardupilot import ArduPilotMissionServer
 from .commands import Commands
-from .dialect import FENCE, MISSION, RALLY, TYPE_NAMES, mavlink
-from .faults import Faults
+from .dialect import FENCE, MISSION, RALLY, TYPE_NAMES, TYPE_NUMBERS, mavlink
+from .faults import ON_VEHICLE, Faults
 from .fence_rules import fence_total
+from .ground_station import GroundStation, invented_plan
 from .mission_server import PlanStore
 from .parameters import Parameters
 from .px4 import Px4MissionServer, Px4Shared
 from .report import EventLog
+from .signing import Signing
 from .telemetry import Telemetry
 
 ROUTES_KEPT = 64
 
 
 class Vehicle:
-    def __init__(self, persona, sysid=1, home=None, seed=0, speedup=1.0, streams_hz=None, capacities=None):
+    def __init__(self, persona, sysid=1, home=None, seed=0, speedup=1.0, streams_hz=None, capacities=None,
+                 signing=None):
         self.loop = asyncio.get_running_loop()
         self.started = self.booted = self.loop.time()
         self.persona, self.sysid, self.speedup = persona, sysid, speedup
@@ -30,6 +33,7 @@ class Vehicle:
         self.log = EventLog(self.clock)
         self.faults = Faults(seed, self.clock)
         self.log.listeners.append(self._fault_events)
+        self.signing = signing or Signing()
         self.store = PlanStore()
         self.parameters = Parameters(self)
         if "SYSID_THISMAV" in self.parameters.table:
@@ -48,8 +52,8 @@ class Vehicle:
     def boot_ms(self):
         return int((self.loop.time() - self.booted) * 1000)
 
-    def event(self, name, **fields):
-        self.log.add(name, fields)
+    def event(self, event, /, **fields):
+        self.log.add(event, fields)
 
     # ---- state
 
@@ -136,9 +140,6 @@ class Vehicle:
 
     # ---- links
 
-    def secure(self, mav):
-        """The place where signing is set up on a new channel's encoder and parser (not done yet)."""
-
     def channel_opened(self, channel):
         self.channels.append(channel)
         self.event("link_up", link=channel.name)
@@ -211,9 +212,8 @@ class Vehicle:
             self.telemetry.stop(channel)
             channel.heard.clear()
         self.armed, self.mode, self.current_seq = False, self.persona.default_mode, 0
-        if close_links:
-            for link in {channel.link for channel in self.channels}:
-                link.close_connections()
+        for link in {channel.link for channel in self.channels}:
+            link.rebooted(close_links)
         self.loop.call_later(down_s, self._up_again)
 
     def _up_again(self):
@@ -235,30 +235,31 @@ class Vehicle:
 
     def add_fault(self, spec):
         fault = self.faults.add(spec)
-        if fault.kind in ("reboot", "vanish") and fault.options["at"] is not None:
-            self.loop.call_later(fault.options["at"], self._go_down, fault)
+        if fault.kind in ON_VEHICLE and fault.options["at"] is not None:
+            self.loop.call_later(fault.options["at"], self._at_its_time, fault)
         return fault
 
-    def _go_down(self, fault):
-        if fault not in self.faults.faults:
-            return  # cleared meanwhile
-        if fault.kind == "vanish":
-            self.vanish()
-        else:
-            self.reboot(fault.options["for"], bool(fault.options["close"]))
+    def _at_its_time(self, fault):
+        if fault in self.faults.faults:  # not cleared meanwhile
+            fault.applied += 1
+            self._carry_out(fault)
 
     def _fault_events(self, name, fields):
         when = {"upload_item": "upload", "download_item": "download"}.get(name)
         if when is None:
             return
-        numbers = {label: number for number, label in TYPE_NAMES.items()}
-        for kind in ("reboot", "vanish"):
-            fault = self._down_fault(kind, numbers[fields["type"]], fields["item"], when)
+        for kind in ON_VEHICLE:
+            fault = self.faults.take(kind, TYPE_NUMBERS[fields["type"]], fields["item"], exact_item=True, when=when)
             if fault:
-                self._go_down(fault)
+                self._carry_out(fault)
 
-    def _down_fault(self, kind, mission_type, item, when):
-        if not any(fault.kind == kind and fault.options["item"] == item for fault in self.faults.faults):
-            return None
-        fault = self.faults.take(kind, mission_type=mission_type, item=item, when=when)
-        return fault if fault and fault.options["item"] is not None else None
+    def _carry_out(self, fault):
+        options = fault.options
+        if fault.kind == "vanish":
+            self.vanish()
+        elif fault.kind == "reboot":
+            self.reboot(options["for"], bool(options["close"]))
+        else:
+            mission_type = MISSION if options["type"] is None else options["type"]
+            GroundStation(self).upload(mission_type, invented_plan(self, mission_type, options["count"]),
+                                       options["pace"] / 1000, options["stop"])
