@@ -5,3 +5,4 @@ pub mod geodesy;
 pub mod link;
 pub mod mission;
 pub mod units;
+pub mod vehicle;

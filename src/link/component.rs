@@ -185,7 +185,7 @@ impl Inbox {
                 Ok(received) => return Ok(received),
                 Err(broadcast::error::RecvError::Lagged(frames)) => {
                     tracing::debug!(frames, "fell behind the link");
-                },
+                }
                 Err(broadcast::error::RecvError::Closed) => return Err(self.link.end_reason()),
             }
         }
@@ -253,7 +253,7 @@ async fn write(
         let frame = packet.to_frame(shared.node(), sequence);
         sequence = sequence.wrapping_add(1);
         match timeout(WRITE_TIMEOUT, sink.send(frame.raw_bytes())).await {
-            Ok(Ok(())) => {},
+            Ok(Ok(())) => {}
             Ok(Err(error)) => return LinkError::Lost(Arc::new(error)),
             Err(_) => return LinkError::Stalled,
         }

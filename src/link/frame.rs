@@ -89,11 +89,8 @@ impl Packet {
 
     /// The frame, ready for the line.
     pub(crate) fn to_frame(&self, from: Node, sequence: u8) -> MAVLinkV2MessageRaw {
-        let header = MavHeader {
-            system_id: from.system.0.into(),
-            component_id: from.component.0,
-            sequence,
-        };
+        let header =
+            MavHeader { system_id: from.system.0.into(), component_id: from.component.0, sequence };
         let mut frame = MAVLinkV2MessageRaw::new();
         // Fails for a message without checksum seed only, and `Packet::new` takes none such.
         let encoded = frame.serialize_message_with_dialect(header, &Wire, self);

@@ -142,7 +142,7 @@ impl Source {
             Self::Stream(reader) => {
                 let raw = reader.read_any_raw_message_with_dialect(&Wire).await;
                 Ok((raw.map_err(into_io)?, None))
-            },
+            }
             Self::Datagrams(datagrams) => datagrams.next().await,
         }
     }
@@ -175,9 +175,9 @@ impl Datagrams {
                     let reader =
                         AsyncMavlinkReader::with_capacity(capacity, io::Cursor::new(bytes));
                     self.datagram = Some((from, reader));
-                },
-                Ok(_) => {},
-                Err(error) if is_passing(&error) => {},
+                }
+                Ok(_) => {}
+                Err(error) if is_passing(&error) => {}
                 Err(error) => return Err(error),
             }
         }
@@ -192,7 +192,7 @@ impl Sink {
             Self::Stream(stream) => {
                 stream.write_all(frame).await?;
                 stream.flush().await
-            },
+            }
             Self::Datagrams { socket, peer } => {
                 let Some(address) = peer.address() else { return Ok(()) };
                 match socket.send_to(frame, address).await {
@@ -200,10 +200,10 @@ impl Sink {
                     Err(error) if is_passing(&error) => {
                         tracing::debug!(%address, %error, "datagram not sent");
                         Ok(())
-                    },
+                    }
                     Err(error) => Err(error),
                 }
-            },
+            }
         }
     }
 }
@@ -297,22 +297,22 @@ fn hint(endpoint: &Endpoint, kind: io::ErrorKind) -> &'static str {
         (Endpoint::Serial { .. }, Kind::NotFound) => {
             "look for the port with `ls /dev/tty{AMA,S,USB,ACM}* /dev/serial/by-id/*`, and see \
              that the UART is enabled"
-        },
+        }
         (Endpoint::Serial { .. }, Kind::PermissionDenied) => {
             "add the user to the group `dialout`, or close the program that holds the port"
-        },
+        }
         (Endpoint::Serial { .. }, _) => "see that no other program uses the port",
         (Endpoint::UdpIn(_) | Endpoint::TcpIn(_), Kind::AddrInUse) => {
             "another program listens on that port; stop it or take another port"
-        },
+        }
         (Endpoint::UdpIn(_) | Endpoint::TcpIn(_), _) => {
             "listen on an address of this machine, such as 0.0.0.0"
-        },
+        }
         (Endpoint::TcpOut(_), Kind::ConnectionRefused) => {
             "nothing listens there; start the vehicle or the MAVLink router first"
-        },
+        }
         (Endpoint::UdpOut(_) | Endpoint::TcpOut(_), _) => {
             "see that the host name is right and the network reaches it"
-        },
+        }
     }
 }

@@ -105,8 +105,7 @@ impl FromStr for Endpoint {
 
 fn parse_serial(url: &str, rest: &str) -> Result<Endpoint, UrlError> {
     const EXPECTED: &str = "serial:/dev/ttyAMA0:921600";
-    let missing =
-        |what| UrlError::Missing { url: url.to_owned(), what, expected: EXPECTED };
+    let missing = |what| UrlError::Missing { url: url.to_owned(), what, expected: EXPECTED };
     let (path, baud) = rest.rsplit_once(':').ok_or_else(|| missing("baud rate"))?;
     if path.is_empty() {
         return Err(missing("device"));
