@@ -4,5 +4,6 @@ pub mod fence;
 pub mod geodesy;
 pub mod link;
 pub mod mission;
+pub mod store;
 pub mod units;
 pub mod vehicle;

@@ -36,6 +36,18 @@ impl From<u8> for Autopilot {
     }
 }
 
+impl Autopilot {
+    /// Its `MAV_AUTOPILOT` number.
+    #[must_use]
+    pub fn number(self) -> u8 {
+        match self {
+            Self::ArduPilot => 3,
+            Self::Px4 => 12,
+            Self::Other(number) => number,
+        }
+    }
+}
+
 impl fmt::Display for Autopilot {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -1,14 +1,17 @@
 //! The vehicle at the other end of a link: finding it, knowing its state, and moving missions,
 //! fences and rally points without ever losing one.
 //!
-//! [`discovery`] finds it, [`state`] follows it, [`download`] and [`upload`] speak the mission
+//! [`discovery`] finds it, [`state`] follows it, [`download`], [`upload`] and [`clear`] speak the mission
 //! protocol over [`transfer`], [`readback`] compares what was sent with what is held,
-//! [`numbering`] turns the vehicle's lists into missions and back.
+//! [`replace`] is the safe sequence of it all, [`numbering`] turns the vehicle's lists into
+//! missions and back.
 
+pub mod clear;
 pub mod discovery;
 pub mod download;
 pub mod numbering;
 pub mod readback;
+pub mod replace;
 pub mod state;
 mod text;
 pub mod timing;

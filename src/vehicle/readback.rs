@@ -88,6 +88,11 @@ pub fn differences(
     held: &[MissionItem],
 ) -> Vec<Difference> {
     let mut found = Vec::new();
+    let has_home_slot = autopilot == Autopilot::ArduPilot && mission_type == MissionType::Mission;
+    if has_home_slot && sent.len() <= 1 && held.len() <= 1 {
+        // No commands, whether home is counted or not.
+        return found;
+    }
     if sent.len() != held.len() {
         found.push(Difference {
             seq: sent.len().min(held.len()),
@@ -97,9 +102,7 @@ pub fn differences(
         });
     }
     for (seq, (sent, held)) in sent.iter().zip(held).enumerate() {
-        let home =
-            autopilot == Autopilot::ArduPilot && mission_type == MissionType::Mission && seq == 0;
-        if !home {
+        if !(has_home_slot && seq == 0) {
             compare(autopilot, mission_type, seq, sent, held, &mut found);
         }
     }

@@ -34,6 +34,9 @@ pub struct Timing {
     pub explanation_age: Duration,
     /// After a fence was accepted: ArduPilot can still erase it.
     pub fence_settles: Duration,
+    /// After a failed upload, before looking what it left: longer than a frame of it can still be
+    /// under way on a slow network.
+    pub stragglers: Duration,
     /// A vehicle whose heartbeat is older than this is not there (heartbeats come at 1 Hz).
     pub heartbeat: Duration,
 }
@@ -53,6 +56,7 @@ impl Default for Timing {
             explanation: Duration::from_millis(500),
             explanation_age: Duration::from_secs(1),
             fence_settles: Duration::from_millis(1200),
+            stragglers: Duration::from_secs(3),
             heartbeat: Duration::from_secs(5),
         }
     }
