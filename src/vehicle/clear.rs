@@ -36,7 +36,7 @@ impl Vehicle {
                 // What is left of an earlier transfer.
                 Some(_) => {}
                 None => {
-                    if patience.is_exhausted(&self.timing) {
+                    if exchange.is_hopeless(&mut patience) {
                         let waited = patience.waited();
                         return Err(exchange.no_answer(Awaited::Acknowledgement, waited));
                     }

@@ -112,7 +112,7 @@ async fn count(exchange: &mut Exchange<'_>) -> Result<(u16, u32), Setback> {
             // What is left of an earlier transfer.
             Some(Heard::Ack { .. } | Heard::Item(_) | Heard::Request(_)) => {}
             None => {
-                if patience.is_exhausted(exchange.timing()) {
+                if exchange.is_hopeless(&mut patience) {
                     return Err(exchange.no_answer(Awaited::Count, patience.waited()).into());
                 }
             }
@@ -171,7 +171,7 @@ async fn items(
             None => {
                 window = (window / 2).max(1);
                 let waiting = asked.keys().next().copied().unwrap_or(next);
-                if patience.is_exhausted(exchange.timing()) {
+                if exchange.is_hopeless(&mut patience) {
                     let error = exchange.no_answer(Awaited::Item(waiting), patience.waited());
                     return Err(Setback::Again(error));
                 }

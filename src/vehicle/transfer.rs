@@ -9,7 +9,7 @@ use tokio::time::{Instant, timeout_at};
 
 use super::Vehicle;
 use super::text::TextLog;
-use super::timing::{RoundTrip, Timing};
+use super::timing::{Patience, RoundTrip, Timing};
 use crate::link::message::{
     MissionAck, MissionCount, MissionItemInt, MissionRequest, MissionRequestInt, StatusText,
 };
@@ -305,6 +305,11 @@ impl<'a> Exchange<'a> {
         let age = self.timing().explanation + self.timing().explanation_age;
         let texts = self.texts.recent(age);
         Ok(Some(TransferError::Refused { mission_type: self.mission_type, result, item, texts }))
+    }
+
+    /// Counts one more wait that was in vain. `true` when it is time to give up.
+    pub(super) fn is_hopeless(&self, patience: &mut Patience) -> bool {
+        patience.is_exhausted(self.timing(), self.vehicle.silent_for())
     }
 
     pub(super) fn no_answer(&self, awaited: Awaited, waited: Duration) -> TransferError {

@@ -112,7 +112,7 @@ impl Upload<'_, '_> {
                 }
                 Some(Heard::Request(_) | Heard::Count { .. } | Heard::Item(_)) => continue,
                 None => {
-                    if patience.is_exhausted(timing) {
+                    if self.exchange.is_hopeless(&mut patience) {
                         return self.silence(&patience);
                     }
                     self.repeat().await?;
