@@ -105,3 +105,6 @@ impl Vehicle {
         let _ = self.monitor.await;
     }
 }
+
+#[cfg(test)]
+mod tests;
