@@ -57,7 +57,8 @@ def parser():
     add("--param", action="append", metavar="NAME=VALUE", default=[], help="set a parameter")
     add("--stream-rate", type=float, metavar="HZ",
         help="telemetry streamed without being asked (default: ardupilot 0, px4 1)")
-    add("--speedup", type=float, default=1.0, metavar="X", help="divide the mission protocol's time-outs by X")
+    add("--speedup", type=float, default=1.0, metavar="X",
+        help="run the vehicle's clock (protocol time-outs, heartbeats, time since boot) X times faster")
     add("--fault", action="append", metavar="SPEC", default=[], help="misbehave, see below")
     add("--script", metavar="FILE", help="JSON commands with a time or an event, see below")
     add("--signing-key", metavar="FILE", help="sign with this key (32 bytes, or 64 hex digits) and demand signatures")
