@@ -48,7 +48,8 @@ def parser():
     add("--mission", metavar="FILE", help="what it holds: a .plan (mission, fence and rally) or QGC WPL 110 file")
     add("--fence", metavar="FILE", help="the fence, from a .plan or waypoint file")
     add("--rally", metavar="FILE", help="the rally points, from a .plan or waypoint file")
-    add("--home", metavar="LAT,LON,ALT", help="home, altitude above mean sea level (default: the mission file's)")
+    add("--home", metavar="LAT,LON,ALT", 
+        help="home, AMSL altitude (default: the mission file's); write --home=-35,... in the south")
     add("--capacity", action="append", metavar="TYPE=N", default=[],
         help="most items of mission, fence or rally (default: the persona's; raised to what the files hold)")
     add("--armed", action="store_true", help="armed from the start")
