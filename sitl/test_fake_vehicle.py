@@ -329,12 +329,13 @@ class FilesAndDump(WithFiles):
                 "149.1600000", "999"))], "z.waypoints:4"),
             (["--fault", "explode"], "unknown fault"), (["--fault", "drop:p=2"], "from 0 to 1"),
             (["--link", "udp:1"], "udpin|udpout"), (["--home", "91,0,0"], "planet"),
+            (["--exit-on-stdin-eof"], "needs a pipe"),
         ]
         for arguments, text in cases:
             with self.subTest(arguments):
                 done = subprocess.run([sys.executable, os.path.join(HERE, "fake_vehicle.py"),
                                        "--link", "udpin:127.0.0.1:0", *arguments],
-                                      capture_output=True, text=True, timeout=20)
+                                      capture_output=True, text=True, timeout=20, stdin=subprocess.DEVNULL)
                 self.assertEqual(done.returncode, 2)
                 self.assertIn(text, done.stderr)
                 self.assertNotIn("Traceback", done.stderr)

@@ -219,7 +219,10 @@ def watch_stdin(loop, quit_event):
         if not os.read(0, 4096):
             loop.remove_reader(0)
             quit_event.set()
-    loop.add_reader(0, readable)
+    try:
+        loop.add_reader(0, readable)
+    except OSError as error:  # a file or /dev/null cannot be waited for
+        raise UsageError("--exit-on-stdin-eof needs a pipe, socket or terminal as stdin") from error
 
 
 def complain(text):
