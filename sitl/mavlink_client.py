@@ -144,6 +144,12 @@ class Client:
                 return None
             self.inbox += self.mav.parse_buffer(os.read(self.fd, 65536)) or []
 
+    def settle(self, quiet_s=0.1):
+        """Drops what is still on its way, such as answers to repeated frames."""
+        while select.select([self.fd], [], [], quiet_s)[0]:
+            self.mav.parse_buffer(os.read(self.fd, 65536))
+        self.inbox.clear()
+
     def expect(self, *names, **options):
         message = self.receive(*names, **options)
         if message is None:
@@ -170,7 +176,8 @@ class Client:
     def download(self, mission_type=MISSION, retry_s=0.5, patience=20):
         """All items, asking again when an answer is lost."""
         answer = self._ask(lambda: self.request_list(mission_type), ("MISSION_COUNT", "MISSION_ACK"),
-                           lambda m: m.mission_type == mission_type and getattr(m, "type", None) != 0, retry_s, patience)
+                           lambda m: m.mission_type == mission_type and getattr(m, "type", None) != 0,
+                           retry_s, patience)
         if answer.get_type() == "MISSION_ACK":
             raise Refusal(answer.type)
         items = []

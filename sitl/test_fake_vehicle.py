@@ -48,7 +48,8 @@ PLAN = {
         {"type": "SimpleItem", "command": 177, "frame": 2, "doJumpId": 3, "autoContinue": True,
          "params": [2, 5, 0, 0, 0, 0, 0]}]},
     "geoFence": {"version": 2,
-                 "polygons": [{"version": 1, "inclusion": False, "polygon": [[22.1, 113.5], [22.2, 113.5], [22.2, 113.6]]}],
+                 "polygons": [{"version": 1, "inclusion": False,
+                               "polygon": [[22.1, 113.5], [22.2, 113.5], [22.2, 113.6]]}],
                  "circles": [{"version": 1, "inclusion": True, "circle": {"center": [22.1, 113.5], "radius": 500.5}}],
                  "breachReturn": [22.15, 113.55, 40]},
     "rallyPoints": {"version": 2, "points": [[22.1, 113.5, 25]]},
@@ -204,6 +205,14 @@ class ArduPilot(WithFiles):
             with self.assertRaises(Refusal):
                 client.upload([waypoint(), Item(177, 2, (7.0, 1.0, 0.0, 0.0))])
 
+    def test_an_item_marked_current_2_is_a_command_to_fly_there_and_no_part_of_the_mission(self):
+        with Fake() as fake, fake.client() as client:
+            client.upload(mission(3))
+            client.item(1, Item(16, 3, x=LAT, y=LON, z=9.0, current=2))
+            self.assertEqual(client.expect("MISSION_ACK").type, 0)
+            self.assertEqual(client.download()[1].z, 50.0)
+            self.assertEqual(fake.dump()["events"]["counts"]["guided_item"], 1)
+
     def test_a_burst_of_requests_in_any_order_is_answered(self):
         with Fake() as fake, fake.client() as client:
             client.upload(mission(40))
@@ -320,12 +329,13 @@ class FilesAndDump(WithFiles):
                 "149.1600000", "999"))], "z.waypoints:4"),
             (["--fault", "explode"], "unknown fault"), (["--fault", "drop:p=2"], "from 0 to 1"),
             (["--link", "udp:1"], "udpin|udpout"), (["--home", "91,0,0"], "planet"),
+            (["--exit-on-stdin-eof"], "needs a pipe"),
         ]
         for arguments, text in cases:
             with self.subTest(arguments):
                 done = subprocess.run([sys.executable, os.path.join(HERE, "fake_vehicle.py"),
                                        "--link", "udpin:127.0.0.1:0", *arguments],
-                                      capture_output=True, text=True, timeout=20)
+                                      capture_output=True, text=True, timeout=20, stdin=subprocess.DEVNULL)
                 self.assertEqual(done.returncode, 2)
                 self.assertIn(text, done.stderr)
                 self.assertNotIn("Traceback", done.stderr)

@@ -1,14 +1,20 @@
 """Tests of the fake vehicle's misbehaviour, control channel, routing and signing. Run: python -m unittest"""
 
+import json
 import os
+import random
+import re
+import socket
 import struct
-import tempfile
+import subprocess
+import sys
 import unittest
 
-from mavlink_client import Fake, Refusal
-from fakevehicle.dialect import ALL, FENCE, MISSION, mavlink
-from fakevehicle.faults import FaultError, Faults, parse_fault
-from test_fake_vehicle import FAST, WithFiles, circle, mission, polygon, waypoint
+from mavlink_client import Fake, HERE, Refusal
+from fakevehicle import cli
+from fakevehicle.dialect import FENCE, MISSION, mavlink
+from fakevehicle.faults import FaultError, Faults, KINDS, parse_fault
+from test_fake_vehicle import FAST, WithFiles, mission, polygon, waypoint
 
 PERSONAS = ("ardupilot", "px4")
 SPEED = {"ardupilot": "10", "px4": "5"}  # ArduPilot asks again after 1 s, PX4 after 0.25 s
@@ -26,13 +32,15 @@ class OnFrames(WithFiles):
         for persona in PERSONAS:
             for spec in spoilers:
                 with self.subTest(persona=persona, fault=spec):
-                    with Fake("--persona", persona, "--fault", spec, "--speedup", SPEED[persona]) as fake, fake.client() as client:
+                    options = ("--persona", persona, "--fault", spec, "--speedup", SPEED[persona])
+                    with Fake(*options) as fake, fake.client() as client:
                         sent = mission(10)
                         client.upload(sent)
                         held = fake.dump()
                         self.assertEqual([(i["x"], i["y"]) for i in held["mission"]["items"]][1:], places(sent)[1:])
                         self.assertGreater(held["faults"][0]["applied"], 0)
                         if persona == "ardupilot" or "reorder" not in spec:
+                            client.settle()
                             self.assertEqual(places(client.download(retry_s=0.1))[1:], places(sent)[1:])
 
     def test_delay_with_jitter_keeps_the_order_and_reorder_does_not(self):
@@ -82,7 +90,7 @@ class OnFrames(WithFiles):
                 parse_fault(spec)
 
     def test_garbage_and_hostile_frames_do_not_stop_it(self):
-        generator = __import__("random").Random(5)
+        generator = random.Random(5)
         for link in ("udpin:127.0.0.1:0", "tcpin:127.0.0.1:0"):
             with self.subTest(link), Fake(links=[link]) as fake, fake.client() as client:
                 for _ in range(200):
@@ -90,6 +98,23 @@ class OnFrames(WithFiles):
                 client.send_raw(b"\0" * 600)  # lets a parser that waits for a long frame finish it
                 client.upload(mission(3))
                 self.assertNotIn("internal_error", fake.dump()["events"]["counts"])
+
+
+class Documentation(unittest.TestCase):
+    def test_the_readme_names_every_option_fault_key_and_event(self):
+        with open(os.path.join(HERE, "README.md"), encoding="utf-8") as file:
+            readme = file.read()
+        options = [option for action in cli.parser()._actions for option in action.option_strings if len(option) > 2]
+        keys = [key for group, own, _ in KINDS.values() for key in (*group, *own)]
+        events = set()
+        for name in os.listdir(os.path.join(HERE, "fakevehicle")):
+            if name.endswith(".py"):
+                with open(os.path.join(HERE, "fakevehicle", name), encoding="utf-8") as file:
+                    events.update(re.findall(r'event\("(\w+)"', file.read()))
+        self.assertIn("upload_item", events)
+        missing = [word for word in (*options, *KINDS, *keys, *events)
+                   if not re.search(rf"(?<![\w-]){re.escape(word)}(?![\w-])", readme)]
+        self.assertEqual(missing, [])
 
 
 class OnPlans(WithFiles):
@@ -243,13 +268,6 @@ class ControlAndScript(WithFiles):
 
     def test_a_unix_socket_serves_as_control_channel(self):
         path = os.path.join(self.directory.name, "control")
-        with Fake("--control", "0") as fake:
-            self.assertIn("port", fake.ready["control"])
-        import json
-        import socket
-        import subprocess
-        import sys
-        from mavlink_client import HERE
         process = subprocess.Popen(
             [sys.executable, os.path.join(HERE, "fake_vehicle.py"), "--link", "pty", "--control", f"unix:{path}"],
             stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
@@ -368,7 +386,6 @@ class RoutingSigningSerial(WithFiles):
             fake.wait_for_event("link_down", 3)
 
     def test_udpout_and_tcpout_find_a_listener(self):
-        import socket
         for kind in (socket.SOCK_DGRAM, socket.SOCK_STREAM):
             with socket.socket(socket.AF_INET, kind) as listener:
                 listener.bind(("127.0.0.1", 0))

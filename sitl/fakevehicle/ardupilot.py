@@ -107,6 +107,11 @@ class ArduPilotMissionServer(MissionServer):
         mission_type = msg.mission_type
         if self._unsupported(channel, peer, mission_type):
             return
+        if mission_type == MISSION and msg.current in (2, 3):
+            # Not part of any mission: "go there now" (2) or "change altitude" (3), whatever else is going on.
+            self.vehicle.event("guided_item", current=msg.current, by=list(peer))
+            self.ack(channel, peer, mavlink.MAV_MISSION_ACCEPTED, mission_type)
+            return
         upload = self.uploads.get(mission_type)
         if upload is None:
             self.ack(channel, peer, mavlink.MAV_MISSION_ERROR, mission_type)

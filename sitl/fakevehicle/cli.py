@@ -48,7 +48,8 @@ def parser():
     add("--mission", metavar="FILE", help="what it holds: a .plan (mission, fence and rally) or QGC WPL 110 file")
     add("--fence", metavar="FILE", help="the fence, from a .plan or waypoint file")
     add("--rally", metavar="FILE", help="the rally points, from a .plan or waypoint file")
-    add("--home", metavar="LAT,LON,ALT", help="home, altitude above mean sea level (default: the mission file's)")
+    add("--home", metavar="LAT,LON,ALT", 
+        help="home, AMSL altitude (default: the mission file's); write --home=-35,... in the south")
     add("--capacity", action="append", metavar="TYPE=N", default=[],
         help="most items of mission, fence or rally (default: the persona's; raised to what the files hold)")
     add("--armed", action="store_true", help="armed from the start")
@@ -57,7 +58,8 @@ def parser():
     add("--param", action="append", metavar="NAME=VALUE", default=[], help="set a parameter")
     add("--stream-rate", type=float, metavar="HZ",
         help="telemetry streamed without being asked (default: ardupilot 0, px4 1)")
-    add("--speedup", type=float, default=1.0, metavar="X", help="divide the mission protocol's time-outs by X")
+    add("--speedup", type=float, default=1.0, metavar="X",
+        help="run the vehicle's clock (protocol time-outs, heartbeats, time since boot) X times faster")
     add("--fault", action="append", metavar="SPEC", default=[], help="misbehave, see below")
     add("--script", metavar="FILE", help="JSON commands with a time or an event, see below")
     add("--signing-key", metavar="FILE", help="sign with this key (32 bytes, or 64 hex digits) and demand signatures")
@@ -217,7 +219,10 @@ def watch_stdin(loop, quit_event):
         if not os.read(0, 4096):
             loop.remove_reader(0)
             quit_event.set()
-    loop.add_reader(0, readable)
+    try:
+        loop.add_reader(0, readable)
+    except OSError as error:  # a file or /dev/null cannot be waited for
+        raise UsageError("--exit-on-stdin-eof needs a pipe, socket or terminal as stdin") from error
 
 
 def complain(text):

@@ -21,15 +21,16 @@ COMMAND_HELP = """control commands (--control, --script), one JSON object per li
   {"cmd": "dump"}                        everything the vehicle holds
   {"cmd": "set", "armed": true, "mode": "AUTO", "home": [lat, lon, alt], "position": [lat, lon, alt],
    "current": 3, "param": {"FENCE_ENABLE": 0}, "mission": X, "fence": X, "rally": X}
-                                         any of these; X is a file name or a list of items as in the dump
-                                         (an edit by another ground station, without a transfer)
+                                         any of these; X is a file name, or a list of items as in the dump but
+                                         without home (an edit by somebody else, without a transfer)
   {"cmd": "fault", "spec": "drop:p=0.3"} adds a fault, answers its number
   {"cmd": "clear-faults", "number": 2}   removes one fault, or all of them without a number
   {"cmd": "reboot", "for": 1.0}          down for that long
   {"cmd": "vanish"}                      silent for good
   {"cmd": "gcs-upload", "type": "mission", "items": X, "pace": 0.05, "stop": 3}
                                          another ground station (255/190) uploads X over the protocol, one item
-                                         per pace seconds, giving up silently after `stop` items if given
+                                         per pace seconds, giving up silently after `stop` items if given; X as
+                                         it goes over the link (for an ArduPilot item 0 is the home slot)
   {"cmd": "statustext", "text": "hello", "severity": 6}
   {"cmd": "quit"}
 

@@ -18,6 +18,7 @@ from .dialect import mavlink
 MOST_UDP_PEERS = 16
 SERIAL_QUEUE_BYTES = 256 * 1024
 SERIAL_CHUNK = 32
+SERIAL_LATENESS_S = 0.002
 
 
 class Wire:
@@ -49,7 +50,7 @@ class Channel:
         self.mav = mavlink.MAVLink(None, srcSystem=vehicle.sysid, srcComponent=mavlink.MAV_COMP_ID_AUTOPILOT1)
         self.mav.robust_parsing = True
         vehicle.signing.secure(self.mav, link.number)
-        self.heard = {}      # (system, component) -> time last heard
+        self.heard = {}      # (system, component) of everybody heard here, oldest first
         self.intervals = {}  # message id -> timer, see telemetry
         self.incoming, self.outgoing = Wire(vehicle.loop), Wire(vehicle.loop)
         self.counts = {"rx": 0, "tx": 0, "rx_bad": 0, "rx_lost": 0, "tx_lost": 0}
@@ -82,7 +83,7 @@ class Channel:
         try:
             messages = self.mav.parse_buffer(data) or []
         except Exception:  # pymavlink raises several kinds on hostile bytes; the link has to live on
-            self.mav.buf, self.mav.buf_index = bytearray(), 0
+            self.mav.buf, self.mav.buf_index, self.mav.expected_length = bytearray(), 0, 8
             self.counts["rx_bad"] += 1
             return
         for message in messages:
@@ -289,7 +290,8 @@ class PtyLink(Link):
             return
         # The bytes are there when the last of them has crossed the line; meanwhile nothing is read.
         self.vehicle.loop.remove_reader(self.master)
-        self.incoming_free = self._crossing_ends(self.incoming_free, len(data))
+        earliest = self.vehicle.loop.time() - SERIAL_LATENESS_S  # so that late timers do not slow the line
+        self.incoming_free = max(earliest, self.incoming_free) + self._crossing_s(data)
         self.vehicle.loop.call_at(self.incoming_free, self._arrived, data)
 
     def _arrived(self, data):
@@ -297,8 +299,8 @@ class PtyLink(Link):
             self.vehicle.loop.add_reader(self.master, self._readable)
             self.channel.receive(data)
 
-    def _crossing_ends(self, line_free, size):
-        return max(self.vehicle.loop.time(), line_free) + size * 10 / self.baud
+    def _crossing_s(self, data):
+        return len(data) * 10 / self.baud
 
     def _write(self, data):
         if self.master is None or self.queued + len(data) > SERIAL_QUEUE_BYTES:
@@ -306,6 +308,7 @@ class PtyLink(Link):
         self.queue.append(data)
         self.queued += len(data)
         if not self.writing:
+            self.outgoing_free = max(self.vehicle.loop.time(), self.outgoing_free)
             self._next_frame()
 
     def _next_frame(self):
@@ -314,7 +317,7 @@ class PtyLink(Link):
         if not self.writing:
             return
         if self.baud:
-            self.outgoing_free = self._crossing_ends(self.outgoing_free, len(self.queue[0]))
+            self.outgoing_free += self._crossing_s(self.queue[0])
             self.vehicle.loop.call_at(self.outgoing_free, self._put)
         else:
             self._put()

@@ -1,7 +1,8 @@
 """Reading QGroundControl `.plan` and `QGC WPL 110` files into items. No vehicle here.
 
 Home is never part of the returned items: a `.plan` keeps it apart, and line 0 of a waypoint file
-is home by convention if it is a WAYPOINT. DO_JUMP targets count from item 0 of the returned mission. Numbers are checked; errors name the file and the item or line.
+is home by convention if it is a WAYPOINT. DO_JUMP targets count from item 0 of the returned mission.
+Numbers are checked; errors name the file and the item or line.
 """
 
 import json

@@ -33,6 +33,15 @@ class Telemetry:
 
     # ---- rates
 
+    def handle(self, channel, msg):
+        """The old REQUEST_DATA_STREAM, which older ground stations send: all default streams at one rate."""
+        if msg.get_type() != "REQUEST_DATA_STREAM":
+            return False
+        rate = msg.req_message_rate if msg.start_stop else 0
+        for message_id in DEFAULT_STREAMS:
+            self.set_interval(channel, message_id, 1 / rate if rate else None)
+        return True
+
     def start_defaults(self, channel):
         if self.vehicle.streams_hz:
             for message_id in DEFAULT_STREAMS:

@@ -16,6 +16,7 @@ from .signing import Signing
 from .telemetry import Telemetry
 
 ROUTES_KEPT = 64
+LEAST_HEARTBEAT_S = 0.02
 
 
 class Vehicle:
@@ -50,7 +51,7 @@ class Vehicle:
         return self.loop.time() - self.started
 
     def boot_ms(self):
-        return int((self.loop.time() - self.booted) * 1000)
+        return int((self.loop.time() - self.booted) * 1000 * self.speedup)
 
     def event(self, event, /, **fields):
         self.log.add(event, fields)
@@ -166,7 +167,7 @@ class Vehicle:
 
     def heartbeat_for_ever(self):
         self.broadcast(self.telemetry.heartbeat())
-        self.loop.call_later(1.0, self.heartbeat_for_ever)
+        self.loop.call_later(max(LEAST_HEARTBEAT_S, 1.0 / self.speedup), self.heartbeat_for_ever)
 
     # ---- messages in
 
@@ -177,18 +178,17 @@ class Vehicle:
         if peer not in channel.heard:
             if len(channel.heard) >= ROUTES_KEPT:
                 channel.heard.pop(next(iter(channel.heard)))
+            channel.heard[peer] = True
             self.event("heard", system=peer[0], component=peer[1], link=channel.name)
-        channel.heard[peer] = self.loop.time()
+            channel.send(self.telemetry.heartbeat())  # nobody has to wait a second for the first one
         system = getattr(msg, "target_system", 0)
         component = getattr(msg, "target_component", 0)
         self._forward(channel, msg, system, component)
         if system not in (0, self.sysid) or component not in (0, mavlink.MAV_COMP_ID_AUTOPILOT1, 190):
             return
-        if not (self.mission_server(channel.link).handle(channel, msg) or self.commands.handle(channel, msg)
-                or self.parameters.handle(channel, msg)) and msg.get_type() == "REQUEST_DATA_STREAM":
-            rate = msg.req_message_rate if msg.start_stop else 0
-            for message_id in (1, 33, 42):
-                self.telemetry.set_interval(channel, message_id, 1 / rate if rate else None)
+        for protocol in (self.mission_server(channel.link), self.commands, self.parameters, self.telemetry):
+            if protocol.handle(channel, msg):
+                return
 
     def _forward(self, channel, msg, system, component):
         """Passes a frame on as a router does: to where its target was heard, a broadcast to all others."""
