@@ -3,6 +3,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod bad_links;
 mod replacing;
 mod sitl;
 mod transfers;
