@@ -45,8 +45,14 @@ impl Vehicle {
         let mut restarts = 0;
         loop {
             let mut exchange = Exchange::new(self, mission_type)?;
-            let mut upload =
-                Upload { exchange: &mut exchange, items, count, last_sent: None, tries: 0 };
+            let mut upload = Upload {
+                exchange: &mut exchange,
+                items,
+                count,
+                last_sent: None,
+                tries: 0,
+                is_unasked: false,
+            };
             match upload.attempt(on_progress).await {
                 Ok(uploaded) => {
                     tracing::debug!(plan = %mission_type, items = count, ?uploaded, "uploaded");
@@ -73,6 +79,8 @@ struct Upload<'a, 'v> {
     last_sent: Option<u16>,
     /// How often that one was sent.
     tries: u32,
+    /// Whether it was last sent because the line was quiet, not because it was asked for.
+    is_unasked: bool,
 }
 
 impl Upload<'_, '_> {
@@ -98,6 +106,13 @@ impl Upload<'_, '_> {
                         tell(usize::from(seq));
                     }
                     self.send_item(seq).await?;
+                    self.is_unasked = false;
+                    sent_at = Instant::now();
+                }
+                Some(Heard::Ack { result: MissionResult::INVALID_SEQUENCE, .. }) => {
+                    let Some(next) = self.request_was_lost() else { continue };
+                    self.send_item(next).await?;
+                    self.is_unasked = false;
                     sent_at = Instant::now();
                 }
                 Some(Heard::Ack { result, .. }) => {
@@ -163,8 +178,21 @@ impl Upload<'_, '_> {
     async fn repeat(&mut self) -> Result<(), TransferError> {
         match self.last_sent {
             None => self.offer().await,
-            Some(seq) => self.send_item(seq).await,
+            Some(seq) => {
+                self.is_unasked = true;
+                self.send_item(seq).await
+            }
         }
+    }
+
+    /// ArduPilot says "invalid sequence" of an item that it has already, and carries on. That is
+    /// noise where the line repeated a frame; where quavd has just repeated the item because the
+    /// line was quiet, it tells that the request for the next one was lost, which ArduPilot would
+    /// repeat after a second only.
+    fn request_was_lost(&self) -> Option<u16> {
+        let next = self.last_sent? + 1;
+        let ardupilot = self.exchange.vehicle.autopilot == Autopilot::ArduPilot;
+        (ardupilot && self.is_unasked && next < self.count).then_some(next)
     }
 
     /// What an acknowledgement means at this point. `None`: go on.
@@ -175,9 +203,9 @@ impl Upload<'_, '_> {
     ) -> Result<Option<Uploaded>, Setback> {
         match result {
             MissionResult::ACCEPTED if self.all_sent() => Ok(Some(Uploaded::Acknowledged)),
-            // Of an earlier transfer; or ArduPilot's word for an item that it has already. It
-            // carries on after saying so.
-            MissionResult::ACCEPTED | MissionResult::INVALID_SEQUENCE => Ok(None),
+            // Of an earlier transfer.
+            MissionResult::ACCEPTED => Ok(None),
+            MissionResult::OPERATION_CANCELLED if self.last_sent.is_none() => Ok(None),
             result if self.last_sent.is_none() && self.means_busy(result) => {
                 busy.pause(self.exchange).await?;
                 self.offer().await?;
@@ -187,14 +215,16 @@ impl Upload<'_, '_> {
                 let Some(error) = self.exchange.refusal(result, self.last_sent).await? else {
                     return Ok(self.all_sent().then_some(Uploaded::Acknowledged));
                 };
-                if result == MissionResult::OPERATION_CANCELLED {
-                    return Err(Setback::Again(error));
-                }
-                if result == MissionResult::ERROR && self.all_sent() && self.tries > 1 {
+                match result {
                     // Perhaps it only says that it no longer waits for the repeated last item.
-                    return Ok(Some(Uploaded::Unconfirmed));
+                    MissionResult::ERROR if self.all_sent() && self.tries > 1 => {
+                        Ok(Some(Uploaded::Unconfirmed))
+                    }
+                    // It knows of no upload any more: it has restarted, or given up.
+                    MissionResult::ERROR if self.is_unasked => Err(Setback::Again(error)),
+                    MissionResult::OPERATION_CANCELLED => Err(Setback::Again(error)),
+                    _ => Err(Setback::Final(error)),
                 }
-                Err(Setback::Final(error))
             }
         }
     }

@@ -30,8 +30,8 @@ async fn held(vehicle: &Vehicle, mission_type: MissionType) -> Vec<MissionItem> 
     vehicle.download(mission_type, &mut |_| {}).await.unwrap().items
 }
 
-/// Uploads 30 items and proves them, under the given faults.
-async fn survives(faults: &[&str]) {
+/// Uploads some items and proves them, under the given faults.
+async fn survives(count: u16, faults: &[&str]) {
     for persona in PERSONAS {
         let mut fake = FakeVehicle::start(&["--persona", persona]);
         let session = Session::open(&fake.endpoint(), search()).await;
@@ -39,7 +39,7 @@ async fn survives(faults: &[&str]) {
             fake.fault(fault);
         }
         let vehicle = &session.vehicle;
-        let sent = mission(vehicle, 30);
+        let sent = mission(vehicle, count);
         vehicle.upload(MISSION, &sent, &mut |_| {}).await.unwrap();
         let held = held(vehicle, MISSION).await;
         assert_eq!(differences(vehicle.autopilot(), MISSION, &sent, &held), [], "{persona}");
@@ -49,17 +49,17 @@ async fn survives(faults: &[&str]) {
 
 #[tokio::test]
 async fn a_mission_gets_through_a_line_that_loses_every_fifth_frame() {
-    survives(&["drop:p=0.2"]).await;
+    survives(30, &["drop:p=0.2"]).await;
 }
 
 #[tokio::test]
 async fn a_mission_gets_through_a_line_that_repeats_reorders_and_corrupts() {
-    survives(&["duplicate:p=0.2", "reorder:p=0.1", "corrupt:p=0.1"]).await;
+    survives(30, &["duplicate:p=0.2", "reorder:p=0.1", "corrupt:p=0.1"]).await;
 }
 
 #[tokio::test]
 async fn a_mission_gets_through_a_slow_line_with_bursts_of_silence() {
-    survives(&["delay:ms=150,jitter=100", "silence:from=2,for=2,every=6"]).await;
+    survives(8, &["delay:ms=150,jitter=100", "silence:from=1,for=2,every=6"]).await;
 }
 
 #[tokio::test]

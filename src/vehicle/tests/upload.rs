@@ -73,6 +73,38 @@ async fn only_what_was_asked_for_is_sent_also_when_the_line_is_quiet() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_lost_request_is_made_up_for_when_ardupilot_says_it_has_the_item() {
+    let (vehicle, mut peer, _task) = scene(ARDUPILOT).await;
+    let (uploaded, ()) = tokio::join!(upload(&vehicle, 3), async {
+        peer.hears::<MissionCount>().await;
+        take(&mut peer, 0).await;
+        assert_eq!(peer.hears::<MissionItemInt>().await.item.seq, 0, "nobody asked for item 1");
+        peer.say(&ack(MissionResult::INVALID_SEQUENCE)).await;
+        assert_eq!(peer.hears::<MissionItemInt>().await.item.seq, 1);
+        peer.say(&ack(MissionResult::INVALID_SEQUENCE)).await; // noise now
+        take(&mut peer, 2).await;
+        peer.say(&ack(MissionResult::ACCEPTED)).await;
+    });
+    assert_eq!(uploaded.unwrap(), Uploaded::Acknowledged);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_vehicle_that_forgot_the_upload_is_offered_it_again() {
+    let (vehicle, mut peer, _task) = scene(ARDUPILOT).await;
+    let (uploaded, ()) = tokio::join!(upload(&vehicle, 2), async {
+        peer.hears::<MissionCount>().await;
+        take(&mut peer, 0).await;
+        peer.hears::<MissionItemInt>().await;
+        peer.say(&ack(MissionResult::ERROR)).await;
+        peer.hears::<MissionCount>().await;
+        take(&mut peer, 0).await;
+        take(&mut peer, 1).await;
+        peer.say(&ack(MissionResult::ACCEPTED)).await;
+    });
+    assert_eq!(uploaded.unwrap(), Uploaded::Acknowledged);
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_lost_last_ack_leaves_it_to_the_read_back() {
     // Silence, and ArduPilot's answer to a repeated last item.
     for answer in [None, Some(MissionResult::ERROR)] {
