@@ -428,12 +428,19 @@ async fn put(
     uploading: fn(Progress) -> Step,
     on_step: OnStep<'_>,
 ) -> Result<(), Obstacle> {
-    let on_progress: OnProgress<'_> = &mut |progress| on_step(uploading(progress));
-    let uploaded = vehicle.upload(mission_type, items, on_progress).await?;
-    if uploaded == Uploaded::Unconfirmed {
-        tracing::warn!(plan = %mission_type, "the upload was not acknowledged; reading back");
+    let upload = async |on_step: OnStep<'_>| {
+        let on_progress: OnProgress<'_> = &mut |progress| on_step(uploading(progress));
+        vehicle.upload(mission_type, items, on_progress).await
+    };
+    let uploaded = upload(on_step).await?;
+    match (uploaded, prove(vehicle, mission_type, items, on_step).await) {
+        (Uploaded::Unconfirmed, Err(Obstacle::Mismatch { .. })) => {
+            tracing::warn!(plan = %mission_type, "the unacknowledged upload did not arrive; again");
+            upload(on_step).await?;
+            prove(vehicle, mission_type, items, on_step).await?;
+        }
+        (_, proof) => proof?,
     }
-    prove(vehicle, mission_type, items, on_step).await?;
     if mission_type == MissionType::Fence {
         tokio::time::sleep(vehicle.timing.fence_settles).await;
         prove(vehicle, mission_type, items, on_step).await?;

@@ -10,7 +10,7 @@ use super::discovery::Autopilot;
 use super::timing::Patience;
 use super::transfer::{
     Awaited, BusyWait, Direction, Exchange, Heard, MOST_ITEMS, MissionResult, OnProgress, Progress,
-    Setback, TransferError,
+    Refusal, Setback, TransferError,
 };
 use crate::link::message::{MissionCount, MissionItemInt};
 use crate::mission::{MissionItem, MissionType};
@@ -63,6 +63,8 @@ impl Vehicle {
                 {
                     restarts += 1;
                     tracing::warn!(plan = %mission_type, %error, "upload begun again");
+                    // What is under way of the old attempt is no answer to the new one.
+                    tokio::time::sleep(self.timing.stragglers).await;
                 }
                 Err(Setback::Again(error) | Setback::Final(error)) => return Err(error),
             }
@@ -83,6 +85,14 @@ struct Upload<'a, 'v> {
     is_unasked: bool,
 }
 
+/// What follows an acknowledgement.
+enum Next {
+    Done(Uploaded),
+    Send(u16),
+    Offer,
+    Wait,
+}
+
 impl Upload<'_, '_> {
     async fn attempt(&mut self, on_progress: OnProgress<'_>) -> Result<Uploaded, Setback> {
         let timing = self.exchange.timing();
@@ -97,7 +107,10 @@ impl Upload<'_, '_> {
         let mut busy = BusyWait::default();
         loop {
             match self.exchange.next_before(deadline).await? {
-                Some(Heard::Request(seq)) if seq < self.count => {
+                Some(Heard::Request(seq)) => {
+                    if seq >= self.count {
+                        continue;
+                    }
                     if self.last_sent.is_none_or(|last| seq > last) {
                         if self.tries <= 1 {
                             self.exchange.round_trip.measured(sent_at.elapsed());
@@ -107,33 +120,28 @@ impl Upload<'_, '_> {
                     }
                     self.send_item(seq).await?;
                     self.is_unasked = false;
-                    sent_at = Instant::now();
                 }
-                Some(Heard::Ack { result: MissionResult::INVALID_SEQUENCE, .. }) => {
-                    let Some(next) = self.request_was_lost() else { continue };
-                    self.send_item(next).await?;
-                    self.is_unasked = false;
-                    sent_at = Instant::now();
-                }
-                Some(Heard::Ack { result, .. }) => {
-                    if let Some(uploaded) = self.acknowledged(result, &mut busy).await? {
+                Some(Heard::Ack { result, .. }) => match self.judge(result, &mut busy).await? {
+                    Next::Done(uploaded) => {
                         tell(total);
                         return Ok(uploaded);
                     }
-                    if self.last_sent.is_some() {
-                        continue; // noise: the running wait goes on
+                    Next::Send(seq) => {
+                        self.send_item(seq).await?;
+                        self.is_unasked = false;
                     }
-                    sent_at = Instant::now();
-                }
-                Some(Heard::Request(_) | Heard::Count { .. } | Heard::Item(_)) => continue,
+                    Next::Offer => self.offer().await?,
+                    Next::Wait => continue,
+                },
+                Some(Heard::Count { .. } | Heard::Item(_)) => continue,
                 None => {
                     if self.exchange.is_hopeless(&mut patience) {
                         return self.silence(&patience);
                     }
                     self.repeat().await?;
-                    sent_at = Instant::now();
                 }
             }
+            sent_at = Instant::now();
             let wait = match self.last_sent {
                 None => timing.request,
                 Some(_) => self.exchange.round_trip.item_wait(timing),
@@ -195,37 +203,42 @@ impl Upload<'_, '_> {
         (ardupilot && self.is_unasked && next < self.count).then_some(next)
     }
 
-    /// What an acknowledgement means at this point. `None`: go on.
-    async fn acknowledged(
-        &mut self,
-        result: MissionResult,
-        busy: &mut BusyWait,
-    ) -> Result<Option<Uploaded>, Setback> {
+    /// What to do about an acknowledgement.
+    async fn judge(&mut self, result: MissionResult, busy: &mut BusyWait) -> Result<Next, Setback> {
         match result {
-            MissionResult::ACCEPTED if self.all_sent() => Ok(Some(Uploaded::Acknowledged)),
-            // Of an earlier transfer.
-            MissionResult::ACCEPTED => Ok(None),
-            MissionResult::OPERATION_CANCELLED if self.last_sent.is_none() => Ok(None),
+            MissionResult::ACCEPTED if self.all_sent() => Ok(Next::Done(Uploaded::Acknowledged)),
+            MissionResult::INVALID_SEQUENCE => {
+                Ok(self.request_was_lost().map_or(Next::Wait, Next::Send))
+            }
+            // Left of an earlier transfer: before the end nothing is accepted, before the first
+            // request there is nothing to cancel, and after it the upload is ours.
+            MissionResult::ACCEPTED => Ok(Next::Wait),
+            MissionResult::OPERATION_CANCELLED if self.last_sent.is_none() => Ok(Next::Wait),
+            MissionResult::DENIED if self.last_sent.is_some() => Ok(Next::Wait),
             result if self.last_sent.is_none() && self.means_busy(result) => {
                 busy.pause(self.exchange).await?;
-                self.offer().await?;
-                Ok(None)
+                Ok(Next::Offer)
             }
-            result => {
-                let Some(error) = self.exchange.refusal(result, self.last_sent).await? else {
-                    return Ok(self.all_sent().then_some(Uploaded::Acknowledged));
-                };
-                match result {
-                    // Perhaps it only says that it no longer waits for the repeated last item.
-                    MissionResult::ERROR if self.all_sent() && self.tries > 1 => {
-                        Ok(Some(Uploaded::Unconfirmed))
-                    }
-                    // It knows of no upload any more: it has restarted, or given up.
-                    MissionResult::ERROR if self.is_unasked => Err(Setback::Again(error)),
-                    MissionResult::OPERATION_CANCELLED => Err(Setback::Again(error)),
-                    _ => Err(Setback::Final(error)),
-                }
+            result => match self.exchange.refusal(result, self.last_sent).await? {
+                Refusal::Accepted if self.all_sent() => Ok(Next::Done(Uploaded::Acknowledged)),
+                Refusal::Accepted => Ok(Next::Wait),
+                Refusal::Asked(seq) if seq < self.count => Ok(Next::Send(seq)),
+                Refusal::Asked(_) => Ok(Next::Wait),
+                Refusal::Meant(error) => self.refused(result, error),
+            },
+        }
+    }
+
+    fn refused(&self, result: MissionResult, error: TransferError) -> Result<Next, Setback> {
+        match result {
+            // Perhaps it only says that it no longer waits for the repeated last item.
+            MissionResult::ERROR if self.all_sent() && self.tries > 1 => {
+                Ok(Next::Done(Uploaded::Unconfirmed))
             }
+            // It knows of no upload any more: it has restarted, or given up.
+            MissionResult::ERROR if self.is_unasked => Err(Setback::Again(error)),
+            MissionResult::OPERATION_CANCELLED => Err(Setback::Again(error)),
+            _ => Err(Setback::Final(error)),
         }
     }
 

@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod bad_links;
+mod campaign;
 mod replacing;
 mod sitl;
 mod transfers;
