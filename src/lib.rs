@@ -1,5 +1,6 @@
 //! quavd's library: from a vehicle's mission and fences to a verified, re-planned mission.
 
+pub mod airspace;
 pub mod fence;
 pub mod geodesy;
 pub mod mission;
