@@ -78,9 +78,9 @@ impl LocalFrame {
         &self,
         positions: impl IntoIterator<Item = &'a LatLon>,
     ) -> Result<f64, ProjectionError> {
-        positions.into_iter().try_fold(1.0, |spread: f64, &position| {
-            Ok(spread.max(self.relative_scale(position)?))
-        })
+        positions
+            .into_iter()
+            .try_fold(1.0, |spread: f64, &position| Ok(spread.max(self.relative_scale(position)?)))
     }
 }
 

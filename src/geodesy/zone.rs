@@ -87,7 +87,10 @@ impl Zone {
     pub(super) fn proj_step(self) -> String {
         match self {
             Self::Utm { number, south } => {
-                format!("+proj=utm +zone={number}{} +ellps=WGS84", if south { " +south" } else { "" })
+                format!(
+                    "+proj=utm +zone={number}{} +ellps=WGS84",
+                    if south { " +south" } else { "" }
+                )
             }
             Self::Ups { south } => format!(
                 "+proj=stere +lat_0={} +lon_0=0 +k=0.994 +x_0=2000000 +y_0=2000000 +ellps=WGS84",
