@@ -3,6 +3,7 @@
 
 use std::cell::Cell;
 
+use geo::line_intersection::{LineIntersection, line_intersection};
 use geo::{Distance, Euclidean, Line, Point};
 use rstar::{AABB, RTree, RTreeObject, SelectionFunction};
 
@@ -41,6 +42,24 @@ impl Barrier {
             BarrierShape::Disc { centre, radius } => {
                 (Euclidean.distance(&segment, &Point::from(centre)) - radius).max(0.0)
             }
+        }
+    }
+}
+
+impl Barrier {
+    /// How far along a ray (from its start) the barrier is first met, metres.
+    #[must_use]
+    pub fn first_hit(&self, ray: Line) -> Option<f64> {
+        let from_start = |point: Xy| (point.x - ray.start.x).hypot(point.y - ray.start.y);
+        match self.shape {
+            BarrierShape::Wall(wall) => line_intersection(ray, wall).map(|hit| match hit {
+                LineIntersection::SinglePoint { intersection, .. } => from_start(intersection),
+                LineIntersection::Collinear { intersection } => {
+                    from_start(intersection.start).min(from_start(intersection.end))
+                }
+            }),
+            BarrierShape::Disc { centre, radius } => (self.distance(ray) <= 0.0)
+                .then(|| (from_start(centre) - radius).max(0.0)),
         }
     }
 }

@@ -148,13 +148,16 @@ fn polygon_outline(
         }
         (FenceRole::Exclusion, true) => Ok((Outline::Solid(vec![ring]), None)),
         (FenceRole::Exclusion, false) => {
-            let flat = signed_area(&ring).abs() <= WALL_THICKNESS * perimeter(&ring);
+            let rings = shells(&ring)?;
+            // What the thickened edges alone would cover, with some allowance for their ends.
+            let bare = 4.0 * WALL_THICKNESS * (perimeter(&ring) + 4.0 * WALL_THICKNESS);
+            let flat = rings.iter().map(|shell| signed_area(shell)).sum::<f64>() <= bare;
             let warning = if flat {
                 format!("{origin}: the ring has no area; it is kept as a wall")
             } else {
                 format!("{origin}: the ring crosses or touches itself; all its faces are obstacle")
             };
-            Ok((Outline::Solid(shells(&ring)?), Some(warning)))
+            Ok((Outline::Solid(rings), Some(warning)))
         }
     }
 }
