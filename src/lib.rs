@@ -3,4 +3,5 @@
 pub mod fence;
 pub mod geodesy;
 pub mod mission;
+pub mod qaoa;
 pub mod units;
