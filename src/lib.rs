@@ -4,4 +4,5 @@ pub mod airspace;
 pub mod fence;
 pub mod geodesy;
 pub mod mission;
+pub mod qaoa;
 pub mod units;
