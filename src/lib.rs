@@ -4,5 +4,6 @@ pub mod airspace;
 pub mod fence;
 pub mod geodesy;
 pub mod mission;
+pub mod planner;
 pub mod qaoa;
 pub mod units;

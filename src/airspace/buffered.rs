@@ -33,6 +33,12 @@ pub fn buffered(outline: &Outline, margin: f64) -> MultiPolygon {
     }
 }
 
+/// A union of inclusions shrunk by `margin` metres.
+#[must_use]
+pub fn shrunk_union(union: &MultiPolygon, margin: f64) -> MultiPolygon {
+    union.buffer_with_style(rounded(-margin))
+}
+
 fn polygon(ring: &[geo::Coord]) -> Polygon {
     Polygon::new(ring.iter().copied().collect(), vec![])
 }

@@ -216,6 +216,12 @@ impl Airspace {
         self.blocker(a, b, margin).is_none()
     }
 
+    /// With [`InclusionRule::Any`], the union of several inclusions: inside it is allowed.
+    #[must_use]
+    pub fn union(&self) -> Option<&MultiPolygon> {
+        self.union.as_ref()
+    }
+
     /// The index over the barriers.
     #[must_use]
     pub fn barriers(&self) -> &BarrierIndex {

@@ -221,7 +221,7 @@ mod tests {
     }
 
     fn all_bits(n: usize) -> impl Iterator<Item = Bits> {
-        (0..1u32 << n).map(move |k| (0..n).map(|i| k >> i & 1 == 1).collect())
+        (0..1u32 << n).map(move |k| Bits::from_fn(n, |i| k >> i & 1 == 1))
     }
 
     fn costs() -> impl Strategy<Value = (Vec<[f64; 4]>, Vec<[bool; 4]>)> {
