@@ -1,6 +1,7 @@
 //! quavd's library: from a vehicle's mission and fences to a verified, re-planned mission.
 
 pub mod fence;
+pub mod formats;
 pub mod geodesy;
 pub mod mission;
 pub mod units;
