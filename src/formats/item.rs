@@ -1,6 +1,8 @@
 //! One mission item as files write it (seven numbers, positions in degrees) to and from a
 //! [`MissionItem`] (positions in 1e-7 degrees), and jump targets to and from a file's numbering.
 
+use serde_json::Value;
+
 use super::error::{Problem, WriteError};
 use crate::geodesy::{LatLon, PositionError};
 use crate::mission::{Command, Frame, Mission, MissionItem};
@@ -103,6 +105,15 @@ pub(super) fn float(value: f64, what: impl Fn() -> String) -> Result<f32, Proble
 /// The `f64` with the same shortest decimal as an `f32`, so that 0.1 is written 0.1.
 pub(super) fn decimal(value: f32) -> f64 {
     value.to_string().parse().unwrap_or(f64::from(value))
+}
+
+/// A JSON number as people write it: `5`, not `5.0`; `null` for NaN.
+pub(super) fn json_number(value: f64) -> Value {
+    let exact = value.fract() == 0.0 && value.abs() < 1e15;
+    if exact && value.to_bits() != (-0.0f64).to_bits() {
+        return Value::from(value as i64); // below 1e15, so exact
+    }
+    Value::from(value)
 }
 
 fn scaled(degrees: f64, what: &str) -> Result<i32, Problem> {

@@ -1,11 +1,9 @@
-//! KML
-use super::{Scenario, error::*, feature::Want};
-pub(super) fn read(_n: &str, _t: &str, _w: Want) -> Result<Scenario, Located> {
-    Err(Problem::UnknownFormat.into())
-}
-/// x
-/// # Errors
-/// x
-pub fn write_kml(_s: &Scenario) -> Result<String, WriteError> {
-    Ok(String::new())
-}
+//! KML: placemarks with polygons, lines and points. What they mean is in [`super::feature`]; pins
+//! that say nothing of themselves are no route. Heights are not read. [`read`] and [`write`] hold
+//! one direction each.
+
+mod read;
+mod write;
+
+pub(super) use read::read;
+pub use write::write_kml;

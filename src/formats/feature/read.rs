@@ -55,6 +55,10 @@ struct Reader<'a> {
     vertices: usize,
     /// Points and lines that say nothing of what they are, where that is no route.
     unused: usize,
+    /// Features without a shape.
+    shapeless: Vec<Place>,
+    /// Obstacles with a hole that is filled, once for each hole.
+    filled: Vec<Place>,
 }
 
 /// Makes a scenario of the features of the file `name`. `pins_are_route`: whether points that say
@@ -80,7 +84,26 @@ pub(in crate::formats) fn scenario(
             reader.unused
         ));
     }
+    let warnings = &mut reader.scenario.warnings;
+    if !reader.shapeless.is_empty() {
+        warnings.push(format!("{}: without a geometry, left out", listed(&reader.shapeless)));
+    }
+    if !reader.filled.is_empty() {
+        warnings.push(format!(
+            "{}: a hole in an obstacle is filled, quavd does not plan inside it",
+            listed(&reader.filled)
+        ));
+    }
     Ok(reader.scenario)
+}
+
+/// The first few places of a long list.
+fn listed(places: &[Place]) -> String {
+    const SHOWN: usize = 5;
+    let names: Vec<_> = places.iter().take(SHOWN).map(ToString::to_string).collect();
+    let more = places.len().saturating_sub(SHOWN);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    names.join(", ") + &more
 }
 
 impl Reader<'_> {
@@ -97,7 +120,7 @@ impl Reader<'_> {
             return Ok(());
         }
         if feature.shapes.is_empty() {
-            self.scenario.warnings.push(format!("{}: it has no geometry", feature.place));
+            self.shapeless.push(feature.place.clone());
         }
         if let Some(circle) = circle(&feature, role)? {
             return self.add_region(&feature, role, circle);
@@ -194,13 +217,9 @@ impl Reader<'_> {
     ) -> Result<(), Problem> {
         let outer = FenceShape::Polygon(ring(outer, "the outline")?);
         self.add_region(feature, role, outer)?;
-        for (index, hole) in holes.iter().enumerate() {
+        for hole in holes {
             if fence_role(role) == FenceRole::Exclusion {
-                self.scenario.warnings.push(format!(
-                    "{}: hole {} of the obstacle is filled: quavd does not plan inside it",
-                    feature.place,
-                    index + 1
-                ));
+                self.filled.push(feature.place.clone());
                 continue;
             }
             let hole = ring(hole, "the hole")?;

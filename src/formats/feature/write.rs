@@ -6,7 +6,7 @@ use super::{Feature, Shape};
 use crate::fence::{FenceRegion, FenceRole, FenceShape};
 use crate::formats::Scenario;
 use crate::formats::error::{Place, WriteError};
-use crate::formats::item::{FileItem, decimal, holds_degrees, jumps_from_indices};
+use crate::formats::item::{FileItem, decimal, holds_degrees, json_number, jumps_from_indices};
 use crate::geodesy::LatLon;
 use crate::mission::MissionItem;
 
@@ -15,7 +15,7 @@ use crate::mission::MissionItem;
 pub(in crate::formats) fn features(scenario: &Scenario) -> Result<Vec<Feature>, WriteError> {
     let mut features = Features(Vec::new());
     if let Some(home) = scenario.mission.home {
-        let altitude = decimal(home.altitude_amsl);
+        let altitude = json_number(decimal(home.altitude_amsl));
         let properties = json!({ "role": "home", "altitude_amsl": altitude });
         features.push(properties, vec![Shape::Point(home.position)]);
     }
@@ -31,10 +31,10 @@ pub(in crate::formats) fn features(scenario: &Scenario) -> Result<Vec<Feature>, 
             "autocontinue": autocontinue,
         });
         if point.is_some() {
-            properties["params"] = json!(params[..4]);
-            properties["altitude"] = json!(params[6]);
+            properties["params"] = params[..4].iter().copied().map(json_number).collect();
+            properties["altitude"] = json_number(params[6]);
         } else {
-            properties["params"] = json!(params);
+            properties["params"] = params.map(json_number).to_vec().into();
         }
         features.push(properties, point.map(Shape::Point).into_iter().collect());
     }
@@ -46,13 +46,13 @@ pub(in crate::formats) fn features(scenario: &Scenario) -> Result<Vec<Feature>, 
         features.push(properties, vec![shape]);
     }
     if let Some((position, altitude)) = scenario.fences.return_point {
-        let properties = json!({ "role": "return", "altitude": decimal(altitude) });
+        let properties = json!({ "role": "return", "altitude": json_number(decimal(altitude)) });
         features.push(properties, vec![Shape::Point(position)]);
     }
     for (index, item) in scenario.rally.iter().enumerate() {
         let place = Place::RallyPoint(index + 1);
         let position = item.position().map_err(|error| WriteError::Position { place, error })?;
-        let altitude = decimal(item.z);
+        let altitude = json_number(decimal(item.z));
         let properties = json!({ "role": "rally", "frame": item.frame.0, "altitude": altitude });
         features.push(properties, vec![Shape::Point(position)]);
     }
@@ -89,7 +89,7 @@ fn region_feature(region: &FenceRegion) -> (Value, Shape) {
     let shape = match &region.shape {
         FenceShape::Polygon(ring) => Shape::Polygon { outer: ring.clone(), holes: Vec::new() },
         FenceShape::Circle { centre, radius } => {
-            properties.insert("radius".to_owned(), json!(radius.0));
+            properties.insert("radius".to_owned(), json_number(radius.0));
             Shape::Point(*centre)
         }
     };

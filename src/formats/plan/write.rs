@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 use crate::fence::items::{FenceItemProblem, radius};
 use crate::fence::{FenceRole, FenceShape};
 use crate::formats::error::{Place, WriteError};
-use crate::formats::item::{FileItem, decimal, jumps_from_indices};
+use crate::formats::item::{FileItem, decimal, json_number, jumps_from_indices};
 use crate::formats::{Firmware, Scenario};
 use crate::geodesy::LatLon;
 use crate::mission::{Command, Frame, MissionItem};
@@ -46,8 +46,8 @@ fn mission(scenario: &Scenario) -> Result<Value, WriteError> {
         "version": 2,
         "firmwareType": firmware,
         "vehicleType": vehicle.vehicle_type,
-        "cruiseSpeed": vehicle.cruise_speed,
-        "hoverSpeed": vehicle.hover_speed,
+        "cruiseSpeed": json_number(vehicle.cruise_speed),
+        "hoverSpeed": json_number(vehicle.hover_speed),
         "globalPlanAltitudeMode": 0, // mixed: each item says its own
         "plannedHomePosition": home,
         "items": items.iter().enumerate().map(|(index, i)| item(index, i)).collect::<Vec<_>>(),
@@ -61,11 +61,11 @@ fn item(index: usize, item: &MissionItem) -> Value {
     object.insert("doJumpId".to_owned(), json!(index + 1));
     object.insert("command".to_owned(), json!(command));
     object.insert("frame".to_owned(), json!(frame));
-    object.insert("params".to_owned(), json!(params)); // NaN becomes null
+    object.insert("params".to_owned(), params.map(json_number).to_vec().into());
     object.insert("autoContinue".to_owned(), json!(autocontinue));
     if let Some(mode) = altitude_mode(item.frame) {
         object.insert("AltitudeMode".to_owned(), json!(mode));
-        object.insert("Altitude".to_owned(), json!(params[6]));
+        object.insert("Altitude".to_owned(), json_number(params[6]));
         object.insert("AMSLAltAboveTerrain".to_owned(), Value::Null);
     }
     Value::Object(object)
@@ -97,7 +97,7 @@ fn fence(scenario: &Scenario) -> Result<Value, WriteError> {
             }
             FenceShape::Circle { centre, radius: length } => {
                 let length = radius(length.0).map_err(unusable)?;
-                let circle = json!({ "center": pair(*centre), "radius": length });
+                let circle = json!({ "center": pair(*centre), "radius": json_number(length.0) });
                 circles.push(json!({ "circle": circle, "inclusion": inclusion, "version": 1 }));
             }
         }
@@ -105,7 +105,7 @@ fn fence(scenario: &Scenario) -> Result<Value, WriteError> {
     let mut fence = json!({ "version": 2, "polygons": polygons, "circles": circles });
     if let Some((position, altitude)) = scenario.fences.return_point {
         let [lat, lon] = pair(position);
-        fence["breachReturn"] = json!([lat, lon, decimal(altitude)]);
+        fence["breachReturn"] = json!([lat, lon, json_number(decimal(altitude))]);
     }
     Ok(fence)
 }
@@ -126,7 +126,7 @@ fn rally(points: &[MissionItem]) -> Result<Value, WriteError> {
             .position()
             .map_err(|error| WriteError::Position { place: Place::RallyPoint(index + 1), error })?;
         let [lat, lon] = pair(position);
-        Ok(json!([lat, lon, decimal(item.z)]))
+        Ok(json!([lat, lon, json_number(decimal(item.z))]))
     };
     let points = points.iter().enumerate().map(point).collect::<Result<Vec<_>, _>>()?;
     Ok(json!({ "version": 2, "points": points }))
