@@ -2,6 +2,7 @@
 
 pub mod airspace;
 pub mod fence;
+pub mod formats;
 pub mod geodesy;
 pub mod mission;
 pub mod planner;

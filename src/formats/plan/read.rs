@@ -1,0 +1,410 @@
+//! Reading a `.plan`.
+
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+
+use serde::Deserialize;
+
+use super::{OBJECT_VERSION, complex};
+use crate::fence::items::{open_ring, radius};
+use crate::fence::{FenceRegion, FenceRole, FenceSet, FenceShape};
+use crate::formats::error::{Located, Place, Problem};
+use crate::formats::item::{FileItem, float, jumps_to_indices, natural, place};
+use crate::formats::{Firmware, MAX_ITEMS, MAX_REGIONS, MAX_VERTICES, Scenario, VehicleHint};
+use crate::geodesy::LatLon;
+use crate::mission::{Command, Frame, Home, Mission, MissionItem};
+
+/// `null` is NaN, as QGroundControl writes "unset".
+type Number = Option<f64>;
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct PlanFile {
+    mission: Option<PlanMission>,
+    geo_fence: Option<GeoFence>,
+    rally_points: Option<RallyPoints>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct PlanMission {
+    version: Number,
+    #[serde(default)]
+    items: Vec<PlanItem>,
+    planned_home_position: Option<Vec<Number>>,
+    firmware_type: Number,
+    vehicle_type: Number,
+    cruise_speed: Number,
+    hover_speed: Number,
+}
+
+/// An item of any type; which keys it must have depends on `type`.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct PlanItem {
+    #[serde(rename = "type")]
+    kind: Option<String>,
+    command: Number,
+    frame: Number,
+    params: Option<Vec<Number>>,
+    /// Version 2 items keep params 5 to 7 here.
+    coordinate: Option<Vec<Number>>,
+    auto_continue: Option<bool>,
+    do_jump_id: Number,
+    complex_item_type: Option<String>,
+    #[serde(rename = "TransectStyleComplexItem")]
+    transect: Option<Transect>,
+    #[serde(flatten)]
+    landing: complex::LandingPattern,
+}
+
+#[derive(Deserialize)]
+struct Transect {
+    #[serde(rename = "Items")]
+    items: Option<Vec<PlanItem>>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct GeoFence {
+    version: Number,
+    #[serde(default)]
+    polygons: Vec<FencePolygon>,
+    #[serde(default)]
+    circles: Vec<FenceCircle>,
+    breach_return: Option<Vec<Number>>,
+    /// Version 1: one inclusion polygon.
+    polygon: Option<Vec<Vec<f64>>>,
+}
+
+#[derive(Deserialize)]
+struct FencePolygon {
+    polygon: Vec<Vec<f64>>,
+    inclusion: bool,
+}
+
+#[derive(Deserialize)]
+struct FenceCircle {
+    circle: Circle,
+    inclusion: bool,
+}
+
+#[derive(Deserialize)]
+struct Circle {
+    center: Vec<f64>,
+    radius: f64,
+}
+
+#[derive(Deserialize)]
+struct RallyPoints {
+    #[serde(default)]
+    points: Vec<Vec<Number>>,
+}
+
+pub(in crate::formats) fn read(name: &str, text: &str) -> Result<Scenario, Located> {
+    let file: PlanFile =
+        serde_json::from_str(text).map_err(|error| Problem::Json(error.to_string()))?;
+    let mut scenario = Scenario::default();
+    if let Some(mission) = file.mission {
+        scenario.vehicle = vehicle(&mission);
+        scenario.mission = read_mission(mission, &mut scenario.warnings)?;
+    }
+    if let Some(fence) = file.geo_fence {
+        scenario.fences = read_fence(name, fence, &mut scenario.warnings)?;
+    }
+    let points = file.rally_points.map(|rally| rally.points).unwrap_or_default();
+    scenario.rally = read_rally(&points)?;
+    Ok(scenario)
+}
+
+fn vehicle(mission: &PlanMission) -> VehicleHint {
+    let default = VehicleHint::default();
+    let speed = |value: Number, default| value.filter(|v| v.is_finite()).unwrap_or(default);
+    VehicleHint {
+        firmware: match mission.firmware_type {
+            Some(3.0) => Firmware::ArduPilot,
+            Some(12.0) => Firmware::Px4,
+            _ => Firmware::Unknown,
+        },
+        vehicle_type: mission
+            .vehicle_type
+            .and_then(|value| natural(value, 255, "vehicleType").ok())
+            .map_or(default.vehicle_type, |value| value as u8), // at most 255
+        cruise_speed: speed(mission.cruise_speed, default.cruise_speed),
+        hover_speed: speed(mission.hover_speed, default.hover_speed),
+    }
+}
+
+fn check_version(version: Number, what: &str) -> Result<(), Located> {
+    match version {
+        Some(number) if number != OBJECT_VERSION => Err(Problem::NotSupported {
+            what: format!("{what} has version {number}, quavd reads version {OBJECT_VERSION}"),
+            advice: "open it in a current QGroundControl and save it again",
+        }
+        .into()),
+        _ => Ok(()),
+    }
+}
+
+fn read_mission(mission: PlanMission, warnings: &mut Vec<String>) -> Result<Mission, Located> {
+    check_version(mission.version, "the mission")?;
+    let home = match mission.planned_home_position.as_deref() {
+        None => None,
+        Some(position) => home(position).map_err(|problem| problem.at(Place::Home))?,
+    };
+    let mut flat = Flat::default();
+    for (index, item) in mission.items.into_iter().enumerate() {
+        flat.add(index + 1, item, warnings)?;
+    }
+    let Flat { mut items, numbers, ids } = flat;
+    let index_of = |target: f64| ids.get(&target.to_bits()).copied().flatten();
+    jumps_to_indices(&mut items, index_of).map_err(|(index, problem)| {
+        problem.at(numbers.get(index).map_or(Place::File, |number| Place::MissionItem(*number)))
+    })?;
+    Ok(Mission { home, items })
+}
+
+/// `[lat, lon, amsl]`; nulls, and zeros as a plan without a home has them, are no home.
+fn home(position: &[Number]) -> Result<Option<Home>, Problem> {
+    match position {
+        [None, ..] | [_, None, ..] | [Some(0.0), Some(0.0), ..] => Ok(None),
+        [Some(lat), Some(lon), rest @ ..] => {
+            let position = place("home", *lat, *lon)?;
+            let altitude = rest.first().copied().flatten().unwrap_or(0.0);
+            let altitude_amsl = float(altitude, || "altitude of home".to_owned())?;
+            Ok(Some(Home { position, altitude_amsl }))
+        }
+        _ => Err(Problem::Value {
+            what: "the position".to_owned(),
+            found: format!("{} numbers", position.len()),
+            expected: "[latitude, longitude, altitude]",
+        }),
+    }
+}
+
+/// The items as they would be uploaded: complex ones as the items they stand for.
+#[derive(Default)]
+struct Flat {
+    items: Vec<MissionItem>,
+    /// For each item, the number under which messages know it: its place in the file's list.
+    numbers: Vec<usize>,
+    /// Index by `doJumpId` (the bits of the number); `None` where two items share one.
+    ids: HashMap<u64, Option<usize>>,
+}
+
+impl Flat {
+    fn add(
+        &mut self,
+        number: usize,
+        item: PlanItem,
+        warnings: &mut Vec<String>,
+    ) -> Result<(), Located> {
+        let at = |problem: Problem| problem.at(Place::MissionItem(number));
+        match item.kind.as_deref() {
+            // Items of the very first versions have no type or a lower-case one.
+            None | Some("SimpleItem" | "missionItem") => {
+                let simple = simple(&item).map_err(at)?;
+                self.push(number, item.do_jump_id, &simple)
+            }
+            Some("ComplexItem") => self.add_complex(number, item, warnings),
+            Some(other) => Err(at(Problem::NotSupported {
+                what: format!("this item is of type {other:?}, which quavd does not know"),
+                advice: "replace it by waypoints in QGroundControl",
+            })),
+        }
+    }
+
+    fn add_complex(
+        &mut self,
+        number: usize,
+        item: PlanItem,
+        warnings: &mut Vec<String>,
+    ) -> Result<(), Located> {
+        let at = |problem: Problem| problem.at(Place::MissionItem(number));
+        let kind = item.complex_item_type.as_deref().unwrap_or("");
+        let before = self.items.len();
+        if let Some(items) = item.transect.and_then(|transect| transect.items) {
+            for inner in items {
+                let simple = simple(&inner).map_err(at)?;
+                self.push(number, inner.do_jump_id, &simple)?;
+            }
+        } else if complex::is_landing_pattern(kind) {
+            for simple in item.landing.items(kind).map_err(at)? {
+                self.push(number, None, &simple)?;
+            }
+        } else {
+            return Err(at(Problem::NotSupported {
+                what: format!("the complex item {kind:?} does not say what is flown"),
+                advice: "upload the plan to a vehicle and read it from there, or replace the item \
+                         by waypoints in QGroundControl",
+            }));
+        }
+        warnings.push(format!(
+            "mission item {number}: the {kind} item is read as the {} items it stands for; a plan \
+             written back holds those",
+            self.items.len() - before
+        ));
+        Ok(())
+    }
+
+    fn push(&mut self, number: usize, id: Number, item: &FileItem) -> Result<(), Located> {
+        let index = self.items.len();
+        if index >= MAX_ITEMS {
+            let problem = Problem::TooMany { what: "mission items", limit: MAX_ITEMS };
+            return Err(problem.at(Place::MissionItem(number)));
+        }
+        // Below MAX_ITEMS, so it fits 16 bits.
+        let item = item.to_item(index as u16);
+        self.items.push(item.map_err(|problem| problem.at(Place::MissionItem(number)))?);
+        self.numbers.push(number);
+        // Without an id QGroundControl counts from 1: home is 0.
+        let id = id.unwrap_or(index as f64 + 1.0);
+        match self.ids.entry(id.to_bits()) {
+            Entry::Occupied(mut taken) => drop(taken.insert(None)),
+            Entry::Vacant(free) => drop(free.insert(Some(index))),
+        }
+        Ok(())
+    }
+}
+
+fn simple(item: &PlanItem) -> Result<FileItem, Problem> {
+    let missing = |key: &str| Problem::Missing {
+        what: format!("{key} in this item"),
+        advice: "open the plan in QGroundControl and save it again",
+    };
+    let command = natural(item.command.ok_or_else(|| missing("command"))?, u16::MAX, "command")?;
+    let frame = natural(item.frame.ok_or_else(|| missing("frame"))?, 255, "frame")?;
+    let mut values = item.params.clone().ok_or_else(|| missing("params"))?;
+    values.extend(item.coordinate.iter().flatten());
+    let Ok(params) = <[Number; 7]>::try_from(values.as_slice()) else {
+        return Err(Problem::Value {
+            what: "the number of params".to_owned(),
+            found: values.len().to_string(),
+            expected: "7",
+        });
+    };
+    Ok(FileItem {
+        command,
+        frame: frame as u8, // at most 255
+        params: params.map(|param| param.unwrap_or(f64::NAN)),
+        autocontinue: item.auto_continue.unwrap_or(true),
+    })
+}
+
+fn read_fence(
+    name: &str,
+    fence: GeoFence,
+    warnings: &mut Vec<String>,
+) -> Result<FenceSet, Located> {
+    let GeoFence { version, mut polygons, circles, breach_return, polygon } = fence;
+    if let Some(polygon) = polygon {
+        if !polygon.is_empty() {
+            warnings.push(
+                "geoFence polygon 1: a fence of version 1, read as an inclusion area".to_owned(),
+            );
+            polygons.insert(0, FencePolygon { polygon, inclusion: true });
+        }
+    } else {
+        check_version(version, "the geoFence")?;
+    }
+    if polygons.len() + circles.len() > MAX_REGIONS {
+        return Err(Problem::TooMany { what: "fence regions", limit: MAX_REGIONS }.into());
+    }
+    if polygons.iter().map(|polygon| polygon.polygon.len()).sum::<usize>() > MAX_VERTICES {
+        return Err(Problem::TooMany { what: "fence vertices", limit: MAX_VERTICES }.into());
+    }
+    let mut fences = FenceSet::default();
+    for (index, FencePolygon { polygon, inclusion }) in polygons.iter().enumerate() {
+        let here = Place::FencePolygon(index + 1);
+        let origin = format!("{name} {here}");
+        let ring = ring(polygon).map_err(|problem| problem.at(here))?;
+        let shape = FenceShape::Polygon(ring);
+        fences.regions.push(FenceRegion { role: role(*inclusion), shape, origin });
+    }
+    for (index, FenceCircle { circle, inclusion }) in circles.iter().enumerate() {
+        let here = Place::FenceCircle(index + 1);
+        let origin = format!("{name} {here}");
+        let shape = read_circle(circle).map_err(|problem| problem.at(here))?;
+        fences.regions.push(FenceRegion { role: role(*inclusion), shape, origin });
+    }
+    if let Some(point) = breach_return {
+        fences.return_point =
+            return_point(&point).map_err(|problem| problem.at(Place::ReturnPoint))?;
+    }
+    Ok(fences)
+}
+
+fn role(inclusion: bool) -> FenceRole {
+    if inclusion { FenceRole::Inclusion } else { FenceRole::Exclusion }
+}
+
+fn ring(vertices: &[Vec<f64>]) -> Result<Vec<LatLon>, Problem> {
+    let vertex = |(index, vertex): (usize, &Vec<f64>)| {
+        let what = format!("vertex {}", index + 1);
+        match vertex[..] {
+            [lat, lon, ..] => place(&what, lat, lon),
+            _ => Err(Problem::Value {
+                what,
+                found: format!("{} numbers", vertex.len()),
+                expected: "[latitude, longitude]",
+            }),
+        }
+    };
+    let ring: Vec<_> = vertices.iter().enumerate().map(vertex).collect::<Result<_, _>>()?;
+    if ring.len() < 3 {
+        return Err(Problem::Value {
+            what: "the number of vertices".to_owned(),
+            found: ring.len().to_string(),
+            expected: "at least 3; draw the polygon again or delete it",
+        });
+    }
+    Ok(open_ring(ring))
+}
+
+fn read_circle(circle: &Circle) -> Result<FenceShape, Problem> {
+    let [lat, lon, ..] = circle.center[..] else {
+        return Err(Problem::Value {
+            what: "the centre".to_owned(),
+            found: format!("{} numbers", circle.center.len()),
+            expected: "[latitude, longitude]",
+        });
+    };
+    let centre = place("centre", lat, lon)?;
+    let radius = radius(circle.radius).map_err(|_| Problem::Value {
+        what: "the radius".to_owned(),
+        found: format!("{} m", circle.radius),
+        expected: "positive and at most 8000 km",
+    })?;
+    Ok(FenceShape::Circle { centre, radius })
+}
+
+fn return_point(point: &[Number]) -> Result<Option<(LatLon, f32)>, Problem> {
+    let Some(Home { position, altitude_amsl }) = home(point)? else { return Ok(None) };
+    Ok(Some((position, altitude_amsl)))
+}
+
+fn read_rally(points: &[Vec<Number>]) -> Result<Vec<MissionItem>, Located> {
+    if points.len() > MAX_ITEMS {
+        return Err(Problem::TooMany { what: "rally points", limit: MAX_ITEMS }.into());
+    }
+    let point = |(index, point): (usize, &Vec<Number>)| {
+        let &[Some(lat), Some(lon), Some(altitude)] = point.as_slice() else {
+            return Err(Problem::Value {
+                what: "the point".to_owned(),
+                found: format!("{point:?}"),
+                expected: "[latitude, longitude, altitude]",
+            }
+            .at(Place::RallyPoint(index + 1)));
+        };
+        let item = FileItem {
+            command: Command::NAV_RALLY_POINT.0,
+            frame: Frame::GLOBAL_RELATIVE_ALT.0,
+            params: [0.0, 0.0, 0.0, 0.0, lat, lon, altitude],
+            autocontinue: true,
+        };
+        place("position", lat, lon)
+            .and_then(|_| item.to_item(index as u16)) // at most MAX_ITEMS
+            .map_err(|problem| problem.at(Place::RallyPoint(index + 1)))
+    };
+    points.iter().enumerate().map(point).collect()
+}
