@@ -21,6 +21,10 @@ const FINE: f64 = COARSE / 16.0;
 /// How far the tangents of a run of shallow corners may stand out from it, metres.
 const RUN_HEIGHT: f64 = 0.3;
 
+/// What corners keep beyond the margin, metres: their edges would else just touch it, and be
+/// clear or not as the last bit of a rounding has it.
+const BEYOND: f64 = 1e-3;
+
 /// A point where a path may bend around a boundary.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Corner {
@@ -40,7 +44,7 @@ pub fn corners(region: RegionId, boundary: &Boundary, space: &LegSpace<'_>) -> V
     let mut found = Vec::new();
     match boundary {
         Boundary::Disc { centre, radius } => {
-            let reach = radius + space.planning_margin();
+            let reach = radius + space.planning_margin() + BEYOND;
             let arc = Arc {
                 centre: *centre,
                 radius: reach,
@@ -53,7 +57,7 @@ pub fn corners(region: RegionId, boundary: &Boundary, space: &LegSpace<'_>) -> V
             arc.push_points(coarse, space, &mut found);
         }
         Boundary::Ring(ring) => {
-            for arc in ring_arcs(ring, space.planning_margin(), region) {
+            for arc in ring_arcs(ring, space.planning_margin() + BEYOND, region) {
                 arc.push_points(COARSE, space, &mut found);
             }
         }

@@ -41,6 +41,10 @@ pub struct CornerPath {
     pub corners: Vec<Corner>,
 }
 
+/// What an edge may be off a corner's tangent beyond the corner's own half turn, radians: where
+/// some points of a tight corner have no room, those that are left turn further.
+const TANGENT_SLACK: f64 = 0.4;
+
 /// A corner as it is passed: with its boundary on the left or on the right.
 type State = (u32, bool);
 
@@ -253,7 +257,7 @@ impl<'a> CornerSearch<'a> {
     }
 }
 
-/// The cosine of how far an edge may be off a corner's tangent, with a little slack.
+/// The cosine of how far an edge may be off a corner's tangent.
 fn slack_cosine(half_turn: f64) -> f64 {
-    (half_turn * 1.05 + 0.01).cos()
+    (half_turn + TANGENT_SLACK).cos()
 }
