@@ -12,6 +12,7 @@ pub mod chain;
 pub mod engine;
 pub mod ising;
 pub mod run;
+mod simd;
 pub mod train;
 pub mod viterbi;
 

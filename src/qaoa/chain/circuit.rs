@@ -3,56 +3,41 @@
 
 use num_complex::Complex64;
 
-use super::super::angles::Angles;
+use super::site::Mixers;
 
 /// Site amplitudes of one set of angles, the same for every qubit.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Circuit {
-    pub(super) layers: usize,
     pub(super) gammas: Vec<f64>,
-    betas: Vec<f64>,
     /// `walk[s][a]`: ⟨s|e^{−iβ_p X}|a_p⟩ … ⟨a_2|e^{−iβ_1 X}|a_1⟩ ⟨a_1|+⟩ for the measured bit s.
     pub(super) walk: [Vec<Complex64>; 2],
 }
 
 impl Circuit {
-    pub(super) fn new(angles: &Angles) -> Self {
-        let mut circuit = Self {
-            layers: angles.layers(),
-            gammas: angles.gammas().to_vec(),
-            betas: angles.betas().to_vec(),
-            walk: Default::default(),
-        };
-        circuit.walk = [0, 1].map(|s| circuit.walk_with(s, None));
-        circuit
+    pub(super) fn new(mixers: &Mixers) -> Self {
+        let gammas = mixers.gammas.clone();
+        let layers = gammas.len();
+        // Amplitude of a layer's mixer to leave the bit as it is, and to flip it (times −i).
+        let steps: Vec<(f64, f64)> = mixers.betas.iter().map(|beta| beta.sin_cos()).collect();
+        let walk = [0, 1].map(|bit| {
+            let amplitude = |a: usize| {
+                let next =
+                    |layer: usize| if layer + 1 < layers { a >> (layer + 1) & 1 } else { bit };
+                let start = Complex64::new(std::f64::consts::FRAC_1_SQRT_2, 0.0);
+                steps.iter().enumerate().fold(start, |product, (layer, &(sin, cos))| {
+                    let flips = a >> layer & 1 != next(layer);
+                    product
+                        * if flips { Complex64::new(0.0, -sin) } else { Complex64::new(cos, 0.0) }
+                })
+            };
+            (0..1 << layers).map(amplitude).collect()
+        });
+        Self { gammas, walk }
     }
 
     /// Number of trajectories of one qubit.
     pub(super) fn trajectories(&self) -> usize {
-        1 << self.layers
-    }
-
-    /// ∂walk/∂β of one layer.
-    pub(super) fn walk_derivative(&self, bit: usize, layer: usize) -> Vec<Complex64> {
-        self.walk_with(bit, Some(layer))
-    }
-
-    fn walk_with(&self, bit: usize, derived: Option<usize>) -> Vec<Complex64> {
-        let step = |layer: usize, flips: bool| {
-            let (sin, cos) = self.betas[layer].sin_cos();
-            let (stay, flip) = if derived == Some(layer) { (-sin, cos) } else { (cos, sin) };
-            if flips { Complex64::new(0.0, -flip) } else { Complex64::new(stay, 0.0) }
-        };
-        (0..self.trajectories())
-            .map(|a| {
-                let next = |layer: usize| {
-                    if layer + 1 < self.layers { a >> (layer + 1) & 1 } else { bit }
-                };
-                let steps =
-                    (0..self.layers).map(|layer| step(layer, a >> layer & 1 != next(layer)));
-                steps.product::<Complex64>() * std::f64::consts::FRAC_1_SQRT_2
-            })
-            .collect()
+        self.walk[0].len()
     }
 
     /// `e^{−i h Σ_l γ_l a_l}` over all trajectories.

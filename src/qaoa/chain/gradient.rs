@@ -1,224 +1,280 @@
-//! ⟨H⟩ and all its derivatives from one sweep from the right end and one from the left.
-
-use num_complex::Complex64;
+//! ⟨H⟩ from one sweep along the chain, and all its derivatives from two.
 
 use super::super::angles::Angles;
 use super::super::ising::ChainIsing;
-use super::transfer::{Folded, Transfer, walsh_hadamard};
+use super::super::simd::{F4, Kernel};
+use super::folded::{CROSSED, STRAIGHT, Slab};
+use super::site::{Mixers, is_quantum, sign};
+use super::sweep::{
+    ENERGY, Joint, Met, SIDE_SLABS, SPECTRUM_SLABS, Site, Workspace, end_of_chain, pass_bond,
+    pass_site, set_bond, transform_all,
+};
 
-/// Everything to one side of a site, as the site sees it.
-#[derive(Debug, Clone)]
-pub(super) struct Side {
-    /// Nobody looks at that side.
-    pub(super) norm: Folded,
-    /// The energy of that side.
-    energy: Folded,
-    /// The coupling to this site, times Z of the neighbour.
-    pull: Folded,
+/// ⟨H⟩ without derivatives, from the left end to the right.
+pub(super) struct Expectation<'a> {
+    pub(super) chain: &'a ChainIsing,
+    pub(super) mixers: &'a Mixers,
+    pub(super) workspace: &'a mut Workspace,
 }
 
-/// The three vectors of a site and all to one side of it, transformed for the bond on its other side.
-#[derive(Debug, Clone)]
-struct Crossing {
-    norm: Folded,
-    z: Folded,
-    energy: Folded,
-}
+impl Kernel for Expectation<'_> {
+    type Output = f64;
 
-impl Side {
-    fn end(size: usize) -> Self {
-        Self {
-            norm: vec![Complex64::ONE; size],
-            energy: vec![Complex64::ZERO; size],
-            pull: vec![Complex64::ZERO; size],
-        }
-    }
-
-    fn through_site(&self, (trace, z): &(Folded, Folded), h: f64) -> Crossing {
-        let mut crossing = Crossing {
-            norm: trace.iter().zip(&self.norm).map(|(s, v)| s * v).collect(),
-            z: z.iter().zip(&self.norm).map(|(s, v)| s * v).collect(),
-            energy: (0..trace.len())
-                .map(|x| trace[x] * self.energy[x] + z[x] * (h * self.norm[x] + self.pull[x]))
-                .collect(),
-        };
-        walsh_hadamard(&mut crossing.norm);
-        walsh_hadamard(&mut crossing.z);
-        walsh_hadamard(&mut crossing.energy);
-        crossing
-    }
-}
-
-impl Crossing {
-    fn over_bond(&self, transfer: &Transfer, j: f64) -> Side {
-        let bond = transfer.bond(j);
-        let mut pull = transfer.cross(&self.z, &bond);
-        pull.iter_mut().for_each(|v| *v *= j);
-        Side {
-            norm: transfer.cross(&self.norm, &bond),
-            energy: transfer.cross(&self.energy, &bond),
-            pull,
-        }
-    }
-}
-
-/// What each site sees to its right when nobody looks there, for sampling.
-pub(super) fn right_norms(transfer: &Transfer, chain: &ChainIsing) -> Vec<Folded> {
-    let n = chain.qubits();
-    let mut norms = vec![vec![Complex64::ONE; transfer.size()]];
-    for i in (1..n).rev() {
-        let (trace, _) = transfer.site(chain.h()[i]);
-        let last = norms.last().into_iter().flatten();
-        let mut vector: Folded = last.zip(&trace).map(|(v, s)| v * s).collect();
-        walsh_hadamard(&mut vector);
-        norms.push(transfer.cross(&vector, &transfer.bond(chain.j()[i - 1])));
-    }
-    norms.reverse();
-    norms
-}
-
-/// ⟨H⟩.
-pub(super) fn expectation(transfer: &Transfer, chain: &ChainIsing) -> f64 {
-    let mut left = Side::end(transfer.size());
-    for (i, &h) in chain.h().iter().enumerate() {
-        let crossing = left.through_site(&transfer.site(h), h);
-        let Some(&j) = chain.j().get(i) else {
-            return chain.constant() + crossing.energy[0].re;
-        };
-        left = crossing.over_bond(transfer, j);
-    }
-    chain.constant()
-}
-
-/// ⟨H⟩ and its derivatives.
-pub(super) fn expectation_and_gradient(transfer: &Transfer, chain: &ChainIsing) -> (f64, Angles) {
-    let (n, size) = (chain.qubits(), transfer.size());
-    let circuit = &transfer.circuit;
-    let mut gradient = Angles::zeros(circuit.layers);
-
-    let mut rights = vec![Side::end(size)];
-    let mut crossings = Vec::new();
-    for i in (1..n).rev() {
-        let crossing = rights[n - 1 - i].through_site(&transfer.site(chain.h()[i]), chain.h()[i]);
-        rights.push(crossing.over_bond(transfer, chain.j()[i - 1]));
-        crossings.push(crossing);
-    }
-
-    let mut expectation = chain.constant();
-    let mut left = Side::end(size);
-    // Σ over sites of everything but the site's own weights, for the derivatives of those.
-    let mut trace_dual = vec![Complex64::ZERO; size];
-    let mut z_dual = vec![Complex64::ZERO; size];
-    let mut field_dual = vec![0.0; size];
-    for i in 0..n {
-        let h = chain.h()[i];
-        let site = transfer.site(h);
-        let right = &rights[n - 1 - i];
-        let phases = circuit.phases(h);
-        for x in 0..size {
-            let phase = phases[x % phases.len()] * phases[x / phases.len()].conj();
-            let trace = left.energy[x] * right.norm[x] + left.norm[x] * right.energy[x];
-            let z =
-                (h * left.norm[x] + left.pull[x]) * right.norm[x] + left.norm[x] * right.pull[x];
-            trace_dual[x] += phase * trace;
-            z_dual[x] += phase * z;
-            field_dual[x] += h * (site.0[x] * trace + site.1[x] * z).im;
-        }
-        let crossing = left.through_site(&site, h);
-        let Some(&j) = chain.j().get(i) else {
-            expectation += crossing.energy[0].re;
-            break;
-        };
-        let other = &crossings[n - 2 - i];
-        let spectrum: Folded = (0..size)
-            .map(|k| {
-                crossing.energy[k] * other.norm[k]
-                    + crossing.norm[k] * other.energy[k]
-                    + j * crossing.z[k] * other.z[k]
-            })
-            .collect();
-        bond_gradient(transfer, j, spectrum, gradient.gammas_mut());
-        left = crossing.over_bond(transfer, j);
-    }
-    site_gradient(transfer, &trace_dual, &z_dual, &field_dual, &mut gradient);
-    (expectation, gradient)
-}
-
-/// The part of ∂/∂γ that comes from one bond, by collapsing its spectrum layer by layer.
-fn bond_gradient(transfer: &Transfer, j: f64, mut spectrum: Folded, slopes: &mut [f64]) {
-    let layers = slopes.len();
-    let angles = transfer.circuit.gammas.iter().map(|gamma| (gamma * j).sin_cos());
-    let factors: Vec<_> = angles.collect();
-    // Layer by layer from the last: contract it with its derivative and all others with themselves.
-    for layer in (0..layers).rev() {
-        let (sin, cos) = factors[layer];
-        let value = [Complex64::new(cos, 0.0), Complex64::new(0.0, -sin)];
-        let slope = [Complex64::new(-sin * j, 0.0), Complex64::new(0.0, -cos * j)];
-        let half = 1 << layer;
-        let at = |ket: usize, bra: usize, k: usize| {
-            let (low_ket, low_bra) = (k % half, k / half);
-            spectrum[low_ket + ket * half + (low_bra + bra * half) * 2 * half]
-        };
-        let mut derived = vec![Complex64::ZERO; half * half];
-        let mut kept = vec![Complex64::ZERO; half * half];
-        for k in 0..half * half {
-            for (ket, bra) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-                let entry = at(ket, bra, k);
-                kept[k] += value[ket] * value[bra].conj() * entry;
-                derived[k] +=
-                    (slope[ket] * value[bra].conj() + value[ket] * slope[bra].conj()) * entry;
+    #[inline(always)]
+    fn run(self) -> f64 {
+        let Self { chain, mixers, workspace } = self;
+        workspace.reserve(mixers, 0);
+        let blocks = mixers.blocks();
+        let Workspace { signs, phases, bond, factors, side, spectrum, .. } = workspace;
+        let mut joint = Joint::END;
+        end_of_chain(side, blocks);
+        for (i, &h) in chain.h().iter().enumerate() {
+            let coupling = chain.j().get(i);
+            let next = coupling.map_or(Joint::END, |&j| Joint::new(mixers, j));
+            let site = Site::new(mixers, phases, h);
+            let nothing = (&[][..], next);
+            pass_site::<false>(&site, (side, joint), nothing, spectrum, &mut Duals::default());
+            if let Some(&j) = coupling {
+                let spectrum = &mut spectrum[..SIDE_SLABS * blocks];
+                transform_all::<STRAIGHT>(spectrum, blocks);
+                set_bond(bond, mixers, j, &signs.straight, factors);
+                pass_bond::<STRAIGHT>(spectrum, factors, side);
             }
+            joint = next;
         }
-        for &(sin, cos) in factors[..layer].iter().rev() {
-            let half = (derived.len() as f64).sqrt() as usize / 2;
-            let value = [Complex64::new(cos, 0.0), Complex64::new(0.0, -sin)];
-            derived = (0..half * half)
-                .map(|k| {
-                    let base = k % half + k / half * 2 * half;
-                    value[0] * value[0].conj() * derived[base]
-                        + value[1] * value[0].conj() * derived[base + half]
-                        + value[0] * value[1].conj() * derived[base + 2 * half * half]
-                        + value[1] * value[1].conj() * derived[base + half + 2 * half * half]
-                })
-                .collect();
-        }
-        slopes[layer] += derived[0].re;
-        spectrum = kept;
+        chain.constant() + total_energy(spectrum, blocks)
     }
 }
 
-fn site_gradient(
-    transfer: &Transfer,
-    trace_dual: &Folded,
-    z_dual: &Folded,
-    field_dual: &[f64],
-    gradient: &mut Angles,
-) {
-    let circuit = &transfer.circuit;
-    let width = circuit.trajectories();
-    for layer in 0..circuit.layers {
-        let z = |a: usize| if a >> layer & 1 == 0 { 1.0 } else { -1.0 };
-        let differences = (0..field_dual.len()).map(|x| z(x % width) - z(x / width));
-        gradient.gammas_mut()[layer] +=
-            differences.zip(field_dual).map(|(difference, dual)| difference * dual).sum::<f64>();
-    }
-    for (bit, sign) in [(0, 1.0), (1, -1.0)] {
-        let walk = &circuit.walk[bit];
-        let seen: Vec<Complex64> = (0..width)
-            .map(|a| {
-                let pairs = walk.iter().enumerate();
-                pairs
-                    .map(|(bra, w)| {
-                        let x = a + width * bra;
-                        w.conj() * (trace_dual[x] + sign * z_dual[x])
-                    })
-                    .sum()
-            })
-            .collect();
-        for layer in 0..circuit.layers {
-            let slope = circuit.walk_derivative(bit, layer);
-            let sum: Complex64 = slope.iter().zip(&seen).map(|(w, v)| w * v).sum();
-            gradient.betas_mut()[layer] += 2.0 * sum.re;
+/// The energy of a whole chain, from the slabs at its last site.
+#[inline(always)]
+fn total_energy(spectrum: &Slab, blocks: usize) -> f64 {
+    let energy = &spectrum[ENERGY * blocks..][..blocks];
+    energy.iter().fold(F4::ZERO, |sum, &block| sum + block).sum()
+}
+
+/// ⟨H⟩ and its derivatives with respect to all angles of the padded circuit.
+pub(super) struct Gradient<'a> {
+    pub(super) chain: &'a ChainIsing,
+    pub(super) mixers: &'a Mixers,
+    pub(super) workspace: &'a mut Workspace,
+}
+
+impl Kernel for Gradient<'_> {
+    type Output = (f64, Angles);
+
+    #[inline(always)]
+    fn run(self) -> (f64, Angles) {
+        let Self { chain, mixers, workspace } = self;
+        let (n, blocks) = (chain.qubits(), mixers.blocks());
+        workspace.reserve(mixers, n);
+        let mut duals = Duals::new(blocks);
+        sweep_from_right(chain, mixers, workspace, &mut duals);
+
+        let Workspace {
+            signs,
+            phases,
+            bond,
+            factors,
+            side,
+            spectrum,
+            rights,
+            right_spectra,
+            product,
+        } = workspace;
+        let mut gradient = Angles::zeros(mixers.gammas.len());
+        let mut joint = Joint::END;
+        end_of_chain(side, blocks);
+        for (i, &h) in chain.h().iter().enumerate() {
+            let coupling = chain.j().get(i);
+            let next = coupling.map_or(Joint::END, |&j| Joint::new(mixers, j));
+            let site = Site::new(mixers, phases, h);
+            let opposite = (&rights[i * SIDE_SLABS * blocks..][..SIDE_SLABS * blocks], next);
+            pass_site::<true>(&site, (side, joint), opposite, spectrum, &mut duals);
+            if let Some(&j) = coupling {
+                transform_all::<STRAIGHT>(spectrum, blocks);
+                set_bond(bond, mixers, j, &signs.straight, factors);
+                pass_bond::<STRAIGHT>(spectrum, factors, side);
+                let there = &right_spectra[(i + 1) * SPECTRUM_SLABS * blocks..];
+                bond.factors(&signs.product, factors);
+                let pair = Pair { here: spectrum, there, joint: next, measured: mixers.cos };
+                let last = pair.multiply(&signs.product, factors, product);
+                gradient.gammas_mut()[mixers.inner()] += 2.0 * j * last;
+                bond.derivatives(product, |place, slope| {
+                    let layer = if place < 2 { 1 - place } else { place };
+                    gradient.gammas_mut()[layer] += j * slope;
+                });
+            }
+            joint = next;
         }
+        duals.finish(mixers, &mut gradient);
+        (chain.constant() + total_energy(spectrum, blocks), gradient)
+    }
+}
+
+/// Fills in the right side of every site and its spectra (those of site 0 are not needed).
+#[inline(always)]
+fn sweep_from_right(
+    chain: &ChainIsing,
+    mixers: &Mixers,
+    workspace: &mut Workspace,
+    duals: &mut Duals,
+) {
+    let (n, blocks) = (chain.qubits(), mixers.blocks());
+    let Workspace { signs, phases, bond, factors, rights, right_spectra, .. } = workspace;
+    end_of_chain(&mut rights[(n - 1) * SIDE_SLABS * blocks..][..SIDE_SLABS * blocks], blocks);
+    let mut joint = Joint::END;
+    for i in (1..n).rev() {
+        let j = chain.j()[i - 1];
+        let next = Joint::new(mixers, j);
+        let (nearer, side) = rights.split_at_mut(i * SIDE_SLABS * blocks);
+        let spectrum = &mut right_spectra[i * SPECTRUM_SLABS * blocks..][..SPECTRUM_SLABS * blocks];
+        let site = Site::new(mixers, phases, chain.h()[i]);
+        pass_site::<false>(&site, (side, joint), (&[], next), spectrum, duals);
+        transform_all::<CROSSED>(spectrum, blocks);
+        set_bond(bond, mixers, j, &signs.crossed, factors);
+        pass_bond::<CROSSED>(spectrum, factors, &mut nearer[(i - 1) * SIDE_SLABS * blocks..]);
+        joint = next;
+    }
+}
+
+/// The spectra that meet at a bond.
+struct Pair<'a> {
+    here: &'a Slab,
+    there: &'a Slab,
+    joint: Joint,
+    /// cos 2β_p.
+    measured: f64,
+}
+
+impl Pair<'_> {
+    /// The product whose contraction with the bond's factors is the energy, into `product`. Returns the
+    /// derivative with respect to 2γ_pJ, for which `factors` are those with the product's signs.
+    #[inline(always)]
+    fn multiply(&self, signs: &Slab, factors: &Slab, product: &mut Slab) -> f64 {
+        let blocks = product.len();
+        let Joint { j, cos, sin } = self.joint;
+        let measured = j * self.measured;
+        let (mut d_cos, mut d_sin) = (F4::ZERO, F4::ZERO);
+        for block in 0..blocks {
+            let at = |spectrum: &Slab| -> [F4; SPECTRUM_SLABS] {
+                std::array::from_fn(|k| spectrum[k * blocks + block])
+            };
+            let [a, a_odd, z, z_odd, energy, energy_odd, energy_q] = at(self.here);
+            let [b, b_odd, y, y_odd, there, there_odd, there_q] = at(self.there);
+            let mixed_even = measured * (a_odd * y + z * b_odd);
+            let mixed_odd = measured * (a * y_odd + z_odd * b);
+            let sum = energy * b
+                + a * there
+                + sin * (energy_odd * b_odd + a_odd * there_odd + mixed_odd)
+                + cos * mixed_even
+                + (measured * self.measured) * (a_odd * b_odd)
+                + j * (z * y);
+            product[block] = signs[block] * sum;
+            d_cos += factors[block] * (energy_q * b + a * there_q + mixed_even);
+            d_sin += factors[block] * (energy_odd * b_odd + a_odd * there_odd + mixed_odd);
+        }
+        cos * d_sin.sum() - sin * d_cos.sum()
+    }
+}
+
+/// Sums over all sites of what ⟨H⟩ changes by if the mixer weights (or field phases) change. Only blocks
+/// that come first among those with ket and bra exchanged are used.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Duals {
+    even: Vec<F4>,
+    even_z: Vec<F4>,
+    odd: Vec<F4>,
+    odd_z: Vec<F4>,
+    z_even: Vec<F4>,
+    z_odd: Vec<F4>,
+    /// Field times imaginary part: for the phases of the inner layers.
+    phase: Vec<F4>,
+    /// For the phase of the last layer.
+    last_phase: f64,
+}
+
+impl Duals {
+    fn new(blocks: usize) -> Self {
+        let slab = || vec![F4::ZERO; blocks];
+        Self {
+            even: slab(),
+            even_z: slab(),
+            odd: slab(),
+            odd_z: slab(),
+            z_even: slab(),
+            z_odd: slab(),
+            phase: slab(),
+            last_phase: 0.0,
+        }
+    }
+
+    /// Adds one block of one site.
+    #[inline(always)]
+    pub(super) fn add(&mut self, mixers: &Mixers, h: f64, block: usize, weight: f64, met: Met) {
+        let (even, odd) = (mixers.even[block], mixers.odd[block]);
+        let (z_even, z_odd) = (mixers.z_even[block], mixers.z_odd[block]);
+        self.even[block] += weight * met.even.re;
+        self.even_z[block] += weight * met.even_z.re;
+        self.odd[block] += weight * met.odd.re;
+        self.odd_z[block] += weight * met.odd_z.re;
+        self.z_even[block] += weight * met.q_even.re;
+        self.z_odd[block] += -weight * met.q_odd.im;
+        let imaginary = even * (met.even.im + mixers.cos * met.even_z.im)
+            + odd * (met.odd.im + mixers.cos * met.odd_z.im)
+            + mixers.sin * (z_even * met.q_even.im + z_odd * met.q_odd.re);
+        self.phase[block] += (weight * h) * imaginary;
+        let turned = z_even * met.q_odd.re + z_odd * met.q_even.im;
+        self.last_phase += 2.0 * weight * h * mixers.sin * turned.sum();
+    }
+
+    /// The derivatives through mixers and field phases, added to `gradient`.
+    fn finish(&self, mixers: &Mixers, gradient: &mut Angles) {
+        let inner = mixers.inner();
+        let quarter = mixers.blocks() / 4;
+        let dot =
+            |x: &Slab, y: &Slab| x.iter().zip(y).fold(F4::ZERO, |sum, (&x, &y)| sum + x * y).sum();
+        // The weights of ⟨H⟩ by state of the last inner layer (c+, c−, q+, q−), inner mixers left open.
+        let open = |even: [f64; 4], odd: [f64; 4], z_even: [f64; 4], z_odd: [f64; 4]| -> Vec<F4> {
+            (0..mixers.blocks())
+                .map(|block| {
+                    let state = block / quarter;
+                    even[state] * (self.even[block] + mixers.cos * self.even_z[block])
+                        + odd[state] * (self.odd[block] + mixers.cos * self.odd_z[block])
+                        + (mixers.sin * z_even[state]) * self.z_even[block]
+                        + (mixers.sin * z_odd[state]) * self.z_odd[block]
+                })
+                .collect()
+        };
+        let (sin, cos) = (2.0 * mixers.betas[inner - 1]).sin_cos();
+        let value = open(
+            [1.0, 1.0, 0.0, 0.0],
+            [cos, -cos, sin, sin],
+            [-0.5 * sin, 0.5 * sin, 0.5 * cos, 0.5 * cos],
+            [0.0, 0.0, 0.5, -0.5],
+        );
+        for layer in 0..inner - 1 {
+            gradient.betas_mut()[layer] += dot(&mixers.walk_with(Some(layer)), &value);
+        }
+        let slope = open(
+            [0.0; 4],
+            [-2.0 * sin, 2.0 * sin, 2.0 * cos, 2.0 * cos],
+            [-cos, cos, -sin, -sin],
+            [0.0; 4],
+        );
+        gradient.betas_mut()[inner - 1] += dot(&mixers.walk, &slope);
+        let through_cos = dot(&mixers.even, &self.even_z) + dot(&mixers.odd, &self.odd_z);
+        let through_sin = dot(&mixers.z_even, &self.z_even) + dot(&mixers.z_odd, &self.z_odd);
+        gradient.betas_mut()[inner] += 2.0 * (mixers.cos * through_sin - mixers.sin * through_cos);
+
+        for layer in 0..inner {
+            let phases = self.phase.iter().flat_map(|block| block.0).enumerate();
+            let terms = phases.map(|(index, phase)| {
+                let state = index >> (2 * layer) & 3;
+                if is_quantum(state) { sign(state) * phase } else { 0.0 }
+            });
+            gradient.gammas_mut()[layer] += 2.0 * terms.sum::<f64>();
+        }
+        gradient.gammas_mut()[inner] += self.last_phase;
     }
 }

@@ -1,14 +1,19 @@
 //! The exact engine for open chains, linear in the number of qubits.
 //!
-//! The p layers make the state a matrix-product state whose bond index is a qubit's trajectory through
-//! the layers. `circuit` holds the amplitudes of one qubit's trajectories, `transfer` carries folded
-//! (ket and bra) vectors along the chain, `gradient` makes ⟨H⟩ and its derivatives out of them, and
-//! `sampling` draws bitstrings and evaluates their probability.
+//! What a qubit knows of its neighbours is its Z value during each phase layer, its *trajectory*, once
+//! for the ket and once for the bra: 4^p numbers carry everything along the chain that an expectation
+//! needs. `folded` stores such vectors and takes them over a bond, `site` has the weights of one qubit,
+//! `sweep` steps from site to site, and `gradient` makes ⟨H⟩ and all derivatives out of a sweep from
+//! each end. For bitstrings the ket's 2^p amplitudes are enough: `circuit` has them for one qubit,
+//! `norms` what lies to the right, and `sampling` draws from both.
 
 mod circuit;
+mod folded;
 mod gradient;
+mod norms;
 mod sampling;
-mod transfer;
+mod site;
+mod sweep;
 
 use rand_chacha::ChaCha8Rng;
 
@@ -16,8 +21,12 @@ use super::angles::Angles;
 use super::bits::Bits;
 use super::engine::{Engine, EngineError, EngineKind, Sample};
 use super::ising::ChainIsing;
+use super::simd;
 use circuit::Circuit;
-use transfer::Transfer;
+use gradient::{Expectation, Gradient};
+use norms::Norms;
+use site::{MIN_LAYERS, Mixers};
+use sweep::{SIDE_SLABS, SPECTRUM_SLABS, Workspace};
 
 /// More layers than this would take hours; the workspace grows with 4^p.
 pub const MAX_LAYERS: usize = 8;
@@ -27,13 +36,14 @@ pub const MAX_LAYERS: usize = 8;
 pub struct ChainEngine {
     chain: ChainIsing,
     memory_limit: u64,
+    workspace: Workspace,
 }
 
 impl ChainEngine {
     /// An engine for `chain` that may use `memory_limit` bytes.
     #[must_use]
     pub fn new(chain: ChainIsing, memory_limit: u64) -> Self {
-        Self { chain, memory_limit }
+        Self { chain, memory_limit, workspace: Workspace::default() }
     }
 
     /// Takes another problem and keeps the workspace.
@@ -44,13 +54,13 @@ impl ChainEngine {
     /// Bytes of workspace for a chain of `qubits` and a circuit of `layers`.
     #[must_use]
     pub fn memory(qubits: usize, layers: usize) -> u64 {
-        let vectors = (qubits as u64).saturating_mul(6).saturating_add(32);
-        vectors
-            .saturating_mul(16)
-            .saturating_mul(1_u64.checked_shl(2 * layers as u32).unwrap_or(u64::MAX))
+        let inner = layers.max(MIN_LAYERS) as u32 - 1;
+        let slab = 8_u64.saturating_mul(1_u64.checked_shl(2 * inner).unwrap_or(u64::MAX));
+        let per_site = (SIDE_SLABS + SPECTRUM_SLABS) as u64;
+        slab.saturating_mul((qubits as u64).saturating_mul(per_site).saturating_add(64))
     }
 
-    fn transfer(&self, angles: &Angles) -> Result<Transfer, EngineError> {
+    fn mixers(&self, angles: &Angles) -> Result<Mixers, EngineError> {
         let (qubits, layers) = (self.chain.qubits(), angles.layers());
         let engine = EngineKind::Chain;
         if layers > MAX_LAYERS {
@@ -60,7 +70,7 @@ impl ChainEngine {
         if needed > available {
             return Err(EngineError::Memory { engine, qubits, layers, needed, available });
         }
-        Ok(Transfer::new(Circuit::new(angles)))
+        Ok(Mixers::new(angles))
     }
 }
 
@@ -74,11 +84,20 @@ impl Engine for ChainEngine {
     }
 
     fn expectation(&mut self, angles: &Angles) -> Result<f64, EngineError> {
-        Ok(gradient::expectation(&self.transfer(angles)?, &self.chain))
+        let mixers = &self.mixers(angles)?;
+        let Self { chain, workspace, .. } = self;
+        Ok(simd::run(Expectation { chain, mixers, workspace }))
     }
 
     fn expectation_and_gradient(&mut self, angles: &Angles) -> Result<(f64, Angles), EngineError> {
-        Ok(gradient::expectation_and_gradient(&self.transfer(angles)?, &self.chain))
+        let mixers = &self.mixers(angles)?;
+        let Self { chain, workspace, .. } = self;
+        let (expectation, padded) = simd::run(Gradient { chain, mixers, workspace });
+        let padding = padded.layers() - angles.layers();
+        let mut gradient = Angles::zeros(angles.layers());
+        gradient.gammas_mut().copy_from_slice(&padded.gammas()[padding..]);
+        gradient.betas_mut().copy_from_slice(&padded.betas()[padding..]);
+        Ok((expectation, gradient))
     }
 
     fn sample(
@@ -87,9 +106,11 @@ impl Engine for ChainEngine {
         shots: u32,
         rng: &mut ChaCha8Rng,
     ) -> Result<Vec<Sample>, EngineError> {
-        let transfer = self.transfer(angles)?;
-        let norms = gradient::right_norms(&transfer, &self.chain);
-        Ok(sampling::sample(&transfer.circuit, &self.chain, &norms, shots, rng))
+        let mixers = &self.mixers(angles)?;
+        let Self { chain, workspace, .. } = self;
+        let norms = simd::run(Norms { chain, mixers, workspace });
+        let circuit = Circuit::new(mixers);
+        Ok(sampling::sample(&circuit, &self.chain, &norms, shots, rng))
     }
 
     fn probability(&mut self, angles: &Angles, bits: &Bits) -> Result<f64, EngineError> {
@@ -97,6 +118,6 @@ impl Engine for ChainEngine {
         if found != expected {
             return Err(EngineError::BitsLength { found, expected });
         }
-        Ok(sampling::probability(&self.transfer(angles)?.circuit, &self.chain, bits))
+        Ok(sampling::probability(&Circuit::new(&self.mixers(angles)?), &self.chain, bits))
     }
 }

@@ -12,7 +12,7 @@ use super::super::bits::Bits;
 use super::super::engine::Sample;
 use super::super::ising::ChainIsing;
 use super::circuit::Circuit;
-use super::transfer::Folded;
+use super::norms::RightNorms;
 
 /// Prefixes that are worked on together, one per vector lane.
 const LANES: usize = 8;
@@ -105,7 +105,7 @@ impl Group {
 pub(super) fn sample(
     circuit: &Circuit,
     chain: &ChainIsing,
-    right_norms: &[Folded],
+    right_norms: &RightNorms,
     shots: u32,
     rng: &mut ChaCha8Rng,
 ) -> Vec<Sample> {
@@ -118,7 +118,9 @@ pub(super) fn sample(
     let mut first = Group::new(width);
     first.re.iter_mut().for_each(|lanes| *lanes = [1.0; LANES]);
     let mut groups = vec![first];
+    let mut right = Vec::new();
     for i in 0..n {
+        right_norms.matrix(i, &mut right);
         let phases = circuit.phases(chain.h()[i]);
         let factors: [Vec<Complex64>; 2] =
             [0, 1].map(|bit| circuit.walk[bit].iter().zip(&phases).map(|(w, p)| w * p).collect());
@@ -127,7 +129,7 @@ pub(super) fn sample(
         for (g, group) in groups.iter().enumerate() {
             let mut zero = group.clone();
             zero.multiply(&factors[0]);
-            let weights = zero.quadratic_form(&right_norms[i]);
+            let weights = zero.quadratic_form(&right);
             for (lane, &weight_zero) in weights.iter().enumerate() {
                 let parent = g * LANES + lane;
                 let Some(prefix) = prefixes.get(parent) else { break };
