@@ -139,27 +139,24 @@ impl Leg {
     }
 }
 
-impl fmt::Display for Leg {
+impl fmt::Display for LegName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let item = |end: &LegEnd| match end.item {
+        let item = |item: Option<usize>| match item {
             Some(item) => format!("item {}", number(item)),
             None => "the start".to_owned(),
         };
+        let (from, to) = (item(self.from), item(self.to));
         match self.kind {
-            LegKind::Flown => write!(f, "leg from {} to {}", item(&self.from), item(&self.to)),
-            LegKind::Takeoff => write!(f, "leg to the takeoff at {}", item(&self.to)),
-            LegKind::Stay => write!(f, "place of {}", item(&self.to)),
-            LegKind::Return(ReturnTo::Home) => write!(f, "return home from {}", item(&self.from)),
+            LegKind::Flown => write!(f, "leg from {from} to {to}"),
+            LegKind::Takeoff => write!(f, "leg to the takeoff at {to}"),
+            LegKind::Stay => write!(f, "place of {to}"),
+            LegKind::Return(ReturnTo::Home) => write!(f, "return home from {from}"),
             LegKind::Return(ReturnTo::Rally(rally)) => {
-                write!(f, "return to rally point {} from {}", rally + 1, item(&self.from))
+                write!(f, "return to rally point {} from {from}", rally + 1)
             }
             LegKind::Return(ReturnTo::LandingSequence(entry)) => {
                 let entry = number(entry);
-                write!(
-                    f,
-                    "return to the landing sequence at item {entry} from {}",
-                    item(&self.from)
-                )
+                write!(f, "return to the landing sequence at item {entry} from {from}")
             }
         }?;
         match self.jump {
