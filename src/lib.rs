@@ -7,4 +7,5 @@ pub mod geodesy;
 pub mod mission;
 pub mod planner;
 pub mod qaoa;
+pub mod replan;
 pub mod units;

@@ -58,8 +58,9 @@ impl Barrier {
                     from_start(intersection.start).min(from_start(intersection.end))
                 }
             }),
-            BarrierShape::Disc { centre, radius } => (self.distance(ray) <= 0.0)
-                .then(|| (from_start(centre) - radius).max(0.0)),
+            BarrierShape::Disc { centre, radius } => {
+                (self.distance(ray) <= 0.0).then(|| (from_start(centre) - radius).max(0.0))
+            }
         }
     }
 }

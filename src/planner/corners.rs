@@ -85,8 +85,7 @@ impl Arc {
             let half_turn = self.turn / count / 2.0;
             let points: Vec<Corner> = (0..count as u32)
                 .map(|k| {
-                    let (sin, cos) =
-                        (self.from + half_turn * f64::from(2 * k + 1)).sin_cos();
+                    let (sin, cos) = (self.from + half_turn * f64::from(2 * k + 1)).sin_cos();
                     let out = Xy { x: cos, y: sin };
                     Corner {
                         point: self.centre + out * (self.radius / half_turn.cos()),

@@ -4,7 +4,9 @@
 //! what is found free is a superset of the free space. If start and goal are not connected in
 //! the superset, no path exists at any grid size.
 
-use geo::{BooleanOps, BoundingRect, Intersects, Line, MultiPolygon, Point, Polygon, Rect, unary_union};
+use geo::{
+    BooleanOps, BoundingRect, Intersects, Line, MultiPolygon, Point, Polygon, Rect, unary_union,
+};
 
 use super::leg_space::LegSpace;
 use crate::airspace::buffered::{buffered, shrunk_union};

@@ -52,7 +52,8 @@ impl<'a> GridSearch<'a> {
         let along = if leg > 0.0 { (goal - start) / leg } else { Xy { x: 1.0, y: 0.0 } };
         let reach = leg.max(100.0);
         let mut resolution = resolution.0.max(0.1);
-        let size = |r: f64| (((leg + 2.0 * reach) / r) as usize + 1, ((2.0 * reach) / r) as usize + 1);
+        let size =
+            |r: f64| (((leg + 2.0 * reach) / r) as usize + 1, ((2.0 * reach) / r) as usize + 1);
         while size(resolution).0 * size(resolution).1 > MAX_POINTS {
             resolution *= 2.0;
         }

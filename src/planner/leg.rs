@@ -159,8 +159,7 @@ impl LegPlanner {
             lambda: self.settings.lambda.0,
             safety_margin: self.settings.buffer.0.max(0.1),
         };
-        let contest =
-            Contest::new(&found[0], judge, &self.settings, &mut self.qaoa, cancelled);
+        let contest = Contest::new(&found[0], judge, &self.settings, &mut self.qaoa, cancelled);
         let (path, rounds) = contest.run(&found[1..], watch)?;
         times.qaoa = began.elapsed();
 

@@ -80,7 +80,8 @@ fn with_sharp_corners_doubled(path: &[Xy], space: &LegSpace<'_>, room: usize) ->
     let mut result = Vec::with_capacity(path.len() + 4);
     let mut spare = room.saturating_sub(path.len());
     for (i, &here) in path.iter().enumerate() {
-        let (Some(&before), Some(&after)) = (i.checked_sub(1).and_then(|k| path.get(k)), path.get(i + 1))
+        let (Some(&before), Some(&after)) =
+            (i.checked_sub(1).and_then(|k| path.get(k)), path.get(i + 1))
         else {
             result.push(here);
             continue;

@@ -50,7 +50,11 @@ pub fn distance_to_edge(point: Xy, a: Xy, b: Xy) -> f64 {
 /// Drops interior points that lie within `tolerance` metres of the edge that would replace
 /// them, where `may_drop(a, c)` agrees to the edge `a`-`c`. The ends stay.
 #[must_use]
-pub fn simplified(path: &[Xy], tolerance: f64, mut may_drop: impl FnMut(Xy, Xy) -> bool) -> Vec<Xy> {
+pub fn simplified(
+    path: &[Xy],
+    tolerance: f64,
+    mut may_drop: impl FnMut(Xy, Xy) -> bool,
+) -> Vec<Xy> {
     let mut kept: Vec<Xy> = Vec::with_capacity(path.len());
     let mut dropped: Vec<Xy> = Vec::new();
     for (i, &point) in path.iter().enumerate() {
@@ -87,11 +91,16 @@ mod tests {
         let line = path(&[(0., 0.), (1., 0.), (2., 0.), (2., 1.), (2., 2.)]);
         assert_eq!(simplified(&line, 0.01, |_, _| true), path(&[(0., 0.), (2., 0.), (2., 2.)]));
         // A slow bend: each point is near its neighbours' edge, the sum of them is not.
-        let arc: Vec<Xy> =
-            (0..=90).map(|i| f64::from(i).to_radians()).map(|a| Xy { x: 10. * a.cos(), y: 10. * a.sin() }).collect();
+        let arc: Vec<Xy> = (0..=90)
+            .map(|i| f64::from(i).to_radians())
+            .map(|a| Xy { x: 10. * a.cos(), y: 10. * a.sin() })
+            .collect();
         let simple = simplified(&arc, 0.05, |_, _| true);
         for point in &arc {
-            let off = simple.windows(2).map(|e| distance_to_edge(*point, e[0], e[1])).fold(f64::MAX, f64::min);
+            let off = simple
+                .windows(2)
+                .map(|e| distance_to_edge(*point, e[0], e[1]))
+                .fold(f64::MAX, f64::min);
             assert!(off <= 0.05 + 1e-12, "{off}");
         }
         assert_eq!(simplified(&line, 0.01, |_, _| false).len(), line.len());

@@ -151,13 +151,8 @@ impl<'a> Contest<'a> {
         for k in 0..most {
             let before = length(&self.incumbent);
             let progress = (f64::from(k) / f64::from(planned.max(1))).min(1.0);
-            let moves = moves(
-                &self.incumbent,
-                &self.judge.space,
-                progress,
-                self.room(),
-                &mut self.rng,
-            );
+            let moves =
+                moves(&self.incumbent, &self.judge.space, progress, self.room(), &mut self.rng);
             self.round(Challenger::Refinement, moves.from, moves.to, &mut watch)?;
             let gained = before - length(&self.incumbent);
             idle = if gained > PROGRESS * before { 0 } else { idle + 1 };
@@ -249,7 +244,10 @@ impl<'a> Contest<'a> {
             Some(angles) if !settings.full_training => {
                 let settled = Some(Settled { window: 2, tolerance: 2e-2 });
                 let steps = settings.steps.min(CARRIED_STEPS);
-                (AnglesSource::CarriedOver(angles.clone()), TrainSettings { steps, settled, ..full })
+                (
+                    AnglesSource::CarriedOver(angles.clone()),
+                    TrainSettings { steps, settled, ..full },
+                )
             }
             _ => (AnglesSource::Ramp(settings.layers), full),
         };

@@ -63,7 +63,8 @@ impl EdgeJudge<'_> {
     pub fn edge(&self, a: Xy, b: Xy) -> Edge {
         // Beyond eight margins the proximity term is below a thousandth of λ.
         let horizon = 8.0 * self.safety_margin;
-        let clearance = self.space.airspace().nearest(a, b, horizon).map(|(clearance, _)| clearance);
+        let clearance =
+            self.space.airspace().nearest(a, b, horizon).map(|(clearance, _)| clearance);
         let collides = clearance.is_some_and(|clearance| clearance < self.space.planning_margin());
         let clearance = clearance.unwrap_or(f64::INFINITY);
         let proximity = self.lambda * (-clearance / self.safety_margin).exp();
@@ -154,7 +155,8 @@ impl Trellis {
             best = next;
         }
         let [clean, colliding] = best[0];
-        let cap = (PENALTY_CAP_SHARE * super::polyline::length(&self.incumbent)).max(LEAST_PENALTY_CAP);
+        let cap =
+            (PENALTY_CAP_SHARE * super::polyline::length(&self.incumbent)).max(LEAST_PENALTY_CAP);
         if !colliding.is_finite() {
             return 0.0;
         }
