@@ -14,7 +14,7 @@ pub struct FormatError {
     /// Where in the file.
     pub place: Place,
     /// What is wrong.
-    pub problem: Problem,
+    pub problem: Box<Problem>,
 }
 
 /// Where in a file.
@@ -183,7 +183,7 @@ pub(super) struct Located {
 
 impl Located {
     pub(super) fn in_file(self, name: &str) -> FormatError {
-        FormatError { file: name.to_owned(), place: self.place, problem: self.problem }
+        FormatError { file: name.to_owned(), place: self.place, problem: Box::new(self.problem) }
     }
 }
 

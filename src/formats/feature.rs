@@ -20,6 +20,8 @@
 //! item. A line with role `track` is a picture of the route and not read.
 
 mod read;
+#[cfg(test)]
+mod tests;
 mod write;
 
 use serde_json::{Map, Value};

@@ -3,6 +3,8 @@
 //! one direction each.
 
 mod read;
+#[cfg(test)]
+mod tests;
 mod write;
 
 pub(super) use read::read;

@@ -6,6 +6,8 @@
 
 mod complex;
 mod read;
+#[cfg(test)]
+mod tests;
 mod write;
 
 pub(super) use read::read;
