@@ -2,6 +2,8 @@
 //!
 //! Kernels are written in plain Rust over [`F4`]; [`run`] has them compiled a second time for AVX2. No
 //! operation is fused or reordered by that, so results are the same to the last bit on every processor.
+//! Closures and the array methods that take them are avoided in kernels: they are not always inlined,
+//! and then not compiled for AVX2.
 
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
@@ -28,8 +30,13 @@ impl F4 {
     /// Rows become columns.
     #[inline(always)]
     pub(super) fn transpose(rows: [Self; 4]) -> [Self; 4] {
-        let [a, b, c, d] = rows.map(|row| row.0);
-        [0, 1, 2, 3].map(|i| Self([a[i], b[i], c[i], d[i]]))
+        let [Self(a), Self(b), Self(c), Self(d)] = rows;
+        [
+            Self([a[0], b[0], c[0], d[0]]),
+            Self([a[1], b[1], c[1], d[1]]),
+            Self([a[2], b[2], c[2], d[2]]),
+            Self([a[3], b[3], c[3], d[3]]),
+        ]
     }
 }
 
@@ -72,7 +79,8 @@ impl Neg for F4 {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self(self.0.map(|value| -value))
+        let Self([a, b, c, d]) = self;
+        Self([-a, -b, -c, -d])
     }
 }
 

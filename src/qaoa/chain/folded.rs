@@ -101,9 +101,10 @@ pub(super) fn cross_bond<const ORDER: bool>(spectrum: &Slab, factors: &Slab, out
     }
 }
 
-/// The order of the layers in a spectrum, from within the block outwards.
-pub(super) fn spectrum_order(layers: usize) -> impl DoubleEndedIterator<Item = usize> + Clone {
-    (0..layers).map(|place| if place < 2 { 1 - place } else { place })
+/// The layer at a place of a spectrum, counted from within the block outwards.
+#[inline(always)]
+pub(super) fn layer_at(place: usize) -> usize {
+    if place < 2 { 1 - place } else { place }
 }
 
 /// Signs that keep spectra real. An odd part of k quantum layers carries i^k, which a slab stores as a
@@ -149,7 +150,7 @@ impl Signs {
     }
 }
 
-/// The factors of one bond, and those of its first layers alone (in [`spectrum_order`]).
+/// The factors of one bond, and those of its first layers alone (in the order of [`layer_at`]).
 #[derive(Debug, Clone, Default)]
 pub(super) struct Bond {
     /// Level k (1 … m) starts at block (4^{k−1} − 1)/3.
@@ -184,8 +185,7 @@ impl Bond {
             let lower = Self::level_start(place)..Self::level_start(place + 1);
             for factor in factors {
                 for block in lower.clone() {
-                    let scaled = factor * self.levels[block];
-                    self.levels.push(scaled);
+                    self.levels.push(factor * self.levels[block]);
                 }
             }
         }

@@ -1,9 +1,11 @@
 //! ⟨H⟩ from one sweep along the chain, and all its derivatives from two.
 
+use std::ops::Range;
+
 use super::super::angles::Angles;
 use super::super::ising::ChainIsing;
 use super::super::simd::{F4, Kernel};
-use super::folded::{CROSSED, STRAIGHT, Slab};
+use super::folded::{CROSSED, STRAIGHT, Slab, layer_at};
 use super::site::{Mixers, is_quantum, sign};
 use super::sweep::{
     ENERGY, Joint, Met, SIDE_SLABS, SPECTRUM_SLABS, Site, Workspace, end_of_chain, pass_bond,
@@ -50,7 +52,23 @@ impl Kernel for Expectation<'_> {
 #[inline(always)]
 fn total_energy(spectrum: &Slab, blocks: usize) -> f64 {
     let energy = &spectrum[ENERGY * blocks..][..blocks];
-    energy.iter().fold(F4::ZERO, |sum, &block| sum + block).sum()
+    let mut sum = F4::ZERO;
+    for &block in energy {
+        sum += block;
+    }
+    sum.sum()
+}
+
+/// Sites whose right sides are kept at once, so that they stay in the processor's cache.
+const WINDOW: usize = 48;
+
+/// Sites of a window for a chain of `qubits` and `layers`, with those to its right that it depends on.
+///
+/// A side's norm does not depend on sites more than p away (nobody looks there, and everything outside
+/// the light cone cancels), nor does a derivative on energies that far: the sweep from the right can
+/// start there as if the chain ended.
+pub(super) fn window_sites(qubits: usize, layers: usize) -> usize {
+    qubits.min(WINDOW + layers + 2)
 }
 
 /// ⟨H⟩ and its derivatives with respect to all angles of the padded circuit.
@@ -67,75 +85,115 @@ impl Kernel for Gradient<'_> {
     fn run(self) -> (f64, Angles) {
         let Self { chain, mixers, workspace } = self;
         let (n, blocks) = (chain.qubits(), mixers.blocks());
-        workspace.reserve(mixers, n);
+        let kept = window_sites(n, mixers.gammas.len());
+        workspace.reserve(mixers, kept);
         let mut duals = Duals::new(blocks);
-        sweep_from_right(chain, mixers, workspace, &mut duals);
-
-        let Workspace {
-            signs,
-            phases,
-            bond,
-            factors,
-            side,
-            spectrum,
-            rights,
-            right_spectra,
-            product,
-        } = workspace;
         let mut gradient = Angles::zeros(mixers.gammas.len());
         let mut joint = Joint::END;
-        end_of_chain(side, blocks);
-        for (i, &h) in chain.h().iter().enumerate() {
-            let coupling = chain.j().get(i);
-            let next = coupling.map_or(Joint::END, |&j| Joint::new(mixers, j));
-            let site = Site::new(mixers, phases, h);
-            let opposite = (&rights[i * SIDE_SLABS * blocks..][..SIDE_SLABS * blocks], next);
-            pass_site::<true>(&site, (side, joint), opposite, spectrum, &mut duals);
-            if let Some(&j) = coupling {
-                transform_all::<STRAIGHT>(spectrum, blocks);
-                set_bond(bond, mixers, j, &signs.straight, factors);
-                pass_bond::<STRAIGHT>(spectrum, factors, side);
-                let there = &right_spectra[(i + 1) * SPECTRUM_SLABS * blocks..];
-                bond.factors(&signs.product, factors);
-                let pair = Pair { here: spectrum, there, joint: next, measured: mixers.cos };
-                let last = pair.multiply(&signs.product, factors, product);
-                gradient.gammas_mut()[mixers.inner()] += 2.0 * j * last;
-                bond.derivatives(product, |place, slope| {
-                    let layer = if place < 2 { 1 - place } else { place };
-                    gradient.gammas_mut()[layer] += j * slope;
-                });
+        end_of_chain(&mut workspace.side, blocks);
+        let mut start = 0;
+        while start < n {
+            let reach = n.min(start + kept);
+            let end = if reach == n { n } else { start + WINDOW };
+            sweep_from_right(chain, mixers, workspace, start..reach);
+            for i in start..end {
+                joint = visit(
+                    chain,
+                    mixers,
+                    workspace,
+                    (i, i - start),
+                    joint,
+                    &mut duals,
+                    &mut gradient,
+                );
             }
-            joint = next;
+            start = end;
         }
         duals.finish(mixers, &mut gradient);
-        (chain.constant() + total_energy(spectrum, blocks), gradient)
+        (chain.constant() + total_energy(&workspace.spectrum, blocks), gradient)
     }
 }
 
-/// Fills in the right side of every site and its spectra (those of site 0 are not needed).
+/// Takes the left side over site `i`, the `place`-th of its window, and its bond, and adds their
+/// derivatives. Returns the bond.
+#[inline(always)]
+fn visit(
+    chain: &ChainIsing,
+    mixers: &Mixers,
+    workspace: &mut Workspace,
+    (i, place): (usize, usize),
+    joint: Joint,
+    duals: &mut Duals,
+    gradient: &mut Angles,
+) -> Joint {
+    let blocks = mixers.blocks();
+    let Workspace { signs, phases, bond, factors, side, spectrum, rights, right_spectra, product } =
+        workspace;
+    let coupling = chain.j().get(i);
+    let next = coupling.map_or(Joint::END, |&j| Joint::new(mixers, j));
+    let site = Site::new(mixers, phases, chain.h()[i]);
+    let opposite = (&rights[place * SIDE_SLABS * blocks..][..SIDE_SLABS * blocks], next);
+    pass_site::<true>(&site, (side, joint), opposite, spectrum, duals);
+    if let Some(&j) = coupling {
+        transform_all::<STRAIGHT>(spectrum, blocks);
+        set_bond(bond, mixers, j, &signs.straight, factors);
+        pass_bond::<STRAIGHT>(spectrum, factors, side);
+        let there = &right_spectra[(place + 1) * SPECTRUM_SLABS * blocks..];
+        bond.factors(&signs.product, factors);
+        let pair = Pair { here: spectrum, there, joint: next, measured: mixers.cos };
+        let last = pair.multiply(&signs.product, factors, product);
+        gradient.gammas_mut()[mixers.inner()] += 2.0 * j * last;
+        bond.derivatives(product, |place, slope| {
+            gradient.gammas_mut()[layer_at(place)] += j * slope;
+        });
+    }
+    next
+}
+
+/// Fills in the right side of every site of a window and its spectra (those of the first are not
+/// needed), as if the chain ended with the window.
 #[inline(always)]
 fn sweep_from_right(
     chain: &ChainIsing,
     mixers: &Mixers,
     workspace: &mut Workspace,
-    duals: &mut Duals,
+    window: Range<usize>,
 ) {
-    let (n, blocks) = (chain.qubits(), mixers.blocks());
+    let blocks = mixers.blocks();
     let Workspace { signs, phases, bond, factors, rights, right_spectra, .. } = workspace;
-    end_of_chain(&mut rights[(n - 1) * SIDE_SLABS * blocks..][..SIDE_SLABS * blocks], blocks);
+    end_of_chain(
+        &mut rights[(window.len() - 1) * SIDE_SLABS * blocks..][..SIDE_SLABS * blocks],
+        blocks,
+    );
     let mut joint = Joint::END;
-    for i in (1..n).rev() {
+    for i in window.clone().skip(1).rev() {
+        let place = i - window.start;
         let j = chain.j()[i - 1];
         let next = Joint::new(mixers, j);
-        let (nearer, side) = rights.split_at_mut(i * SIDE_SLABS * blocks);
-        let spectrum = &mut right_spectra[i * SPECTRUM_SLABS * blocks..][..SPECTRUM_SLABS * blocks];
+        let (nearer, side) = rights.split_at_mut(place * SIDE_SLABS * blocks);
+        let spectrum =
+            &mut right_spectra[place * SPECTRUM_SLABS * blocks..][..SPECTRUM_SLABS * blocks];
         let site = Site::new(mixers, phases, chain.h()[i]);
-        pass_site::<false>(&site, (side, joint), (&[], next), spectrum, duals);
+        pass_site::<false>(&site, (side, joint), (&[], next), spectrum, &mut Duals::default());
         transform_all::<CROSSED>(spectrum, blocks);
         set_bond(bond, mixers, j, &signs.crossed, factors);
-        pass_bond::<CROSSED>(spectrum, factors, &mut nearer[(i - 1) * SIDE_SLABS * blocks..]);
+        pass_bond::<CROSSED>(spectrum, factors, &mut nearer[(place - 1) * SIDE_SLABS * blocks..]);
         joint = next;
     }
+}
+
+/// One block of all slabs of a spectrum.
+#[inline(always)]
+fn column(spectrum: &Slab, blocks: usize, block: usize) -> [F4; SPECTRUM_SLABS] {
+    [
+        spectrum[block],
+        spectrum[blocks + block],
+        spectrum[2 * blocks + block],
+        spectrum[3 * blocks + block],
+        spectrum[4 * blocks + block],
+        spectrum[5 * blocks + block],
+        spectrum[6 * blocks + block],
+    ]
 }
 
 /// The spectra that meet at a bond.
@@ -157,11 +215,9 @@ impl Pair<'_> {
         let measured = j * self.measured;
         let (mut d_cos, mut d_sin) = (F4::ZERO, F4::ZERO);
         for block in 0..blocks {
-            let at = |spectrum: &Slab| -> [F4; SPECTRUM_SLABS] {
-                std::array::from_fn(|k| spectrum[k * blocks + block])
-            };
-            let [a, a_odd, z, z_odd, energy, energy_odd, energy_q] = at(self.here);
-            let [b, b_odd, y, y_odd, there, there_odd, there_q] = at(self.there);
+            let [a, a_odd, z, z_odd, energy, energy_odd, energy_q] =
+                column(self.here, blocks, block);
+            let [b, b_odd, y, y_odd, there, there_odd, there_q] = column(self.there, blocks, block);
             let mixed_even = measured * (a_odd * y + z * b_odd);
             let mixed_odd = measured * (a * y_odd + z_odd * b);
             let sum = energy * b

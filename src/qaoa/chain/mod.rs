@@ -57,7 +57,10 @@ impl ChainEngine {
         let inner = layers.max(MIN_LAYERS) as u32 - 1;
         let slab = 8_u64.saturating_mul(1_u64.checked_shl(2 * inner).unwrap_or(u64::MAX));
         let per_site = (SIDE_SLABS + SPECTRUM_SLABS) as u64;
-        slab.saturating_mul((qubits as u64).saturating_mul(per_site).saturating_add(64))
+        let kept = gradient::window_sites(qubits, layers.max(MIN_LAYERS)) as u64;
+        // The gradient's window; sampling keeps two slabs of every site.
+        let slabs = per_site.saturating_mul(kept).max((qubits as u64).saturating_mul(2));
+        slab.saturating_mul(slabs.saturating_add(64))
     }
 
     fn mixers(&self, angles: &Angles) -> Result<Mixers, EngineError> {

@@ -5,9 +5,9 @@ use num_complex::Complex64;
 
 use super::super::ising::ChainIsing;
 use super::super::simd::{C4, F4, Kernel};
-use super::folded::{CROSSED, Slab, cross_bond, exchanged, exchanged_block, transform};
+use super::folded::{CROSSED, cross_bond, exchanged_block, transform};
 use super::site::Mixers;
-use super::sweep::{Joint, Site, Workspace, set_bond};
+use super::sweep::{Joint, Site, Workspace, load, set_bond};
 
 /// Two slabs and a bond per site.
 #[derive(Debug, Clone)]
@@ -61,13 +61,6 @@ impl Kernel for Norms<'_> {
         }
         norms
     }
-}
-
-/// Twice the complex numbers of one block.
-#[inline(always)]
-fn load(slab: &Slab, block: usize, other: usize) -> C4 {
-    let (x, y) = (slab[block], exchanged(slab[other]));
-    C4 { re: x + y, im: x - y }
 }
 
 impl RightNorms {

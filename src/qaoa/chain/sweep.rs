@@ -6,7 +6,9 @@
 //! in parts, so six slabs hold all three vectors.
 
 use super::super::simd::{C4, F4};
-use super::folded::{Bond, Signs, Slab, cross_bond, exchanged, exchanged_block, transform};
+use super::folded::{
+    Bond, Signs, Slab, cross_bond, exchanged, exchanged_block, layer_at, transform,
+};
 use super::gradient::Duals;
 use super::site::{Mixers, Phases};
 
@@ -61,13 +63,24 @@ impl<'a> Site<'a> {
     }
 }
 
-/// A side's slabs in one block, as complex numbers (twice their value).
+/// One slab's block as complex numbers (twice their value).
 #[inline(always)]
-fn load(slabs: &Slab, blocks: usize, block: usize, other: usize) -> [C4; SIDE_SLABS] {
-    std::array::from_fn(|k| {
-        let (x, y) = (slabs[k * blocks + block], exchanged(slabs[k * blocks + other]));
-        C4 { re: x + y, im: x - y }
-    })
+pub(super) fn load(slab: &Slab, block: usize, other: usize) -> C4 {
+    let (x, y) = (slab[block], exchanged(slab[other]));
+    C4 { re: x + y, im: x - y }
+}
+
+/// A side's slabs in one block.
+#[inline(always)]
+fn load_side(slabs: &Slab, blocks: usize, block: usize, other: usize) -> [C4; SIDE_SLABS] {
+    [
+        load(&slabs[..blocks], block, other),
+        load(&slabs[blocks..2 * blocks], block, other),
+        load(&slabs[2 * blocks..3 * blocks], block, other),
+        load(&slabs[3 * blocks..4 * blocks], block, other),
+        load(&slabs[4 * blocks..5 * blocks], block, other),
+        load(&slabs[5 * blocks..6 * blocks], block, other),
+    ]
 }
 
 #[inline(always)]
@@ -111,6 +124,27 @@ impl Pull {
     }
 }
 
+/// What a measured site does to the quantum states of its last layer: phase of the field, mixer, Z.
+struct Quantum {
+    even: F4,
+    odd: F4,
+    /// Of the field's phase, times 2 sin 2β_p.
+    cos: f64,
+    sin: f64,
+}
+
+impl Quantum {
+    #[inline(always)]
+    fn apply(&self, even: C4, odd: C4) -> (C4, C4) {
+        let turned_even = self.cos * even + self.sin * odd;
+        let turned_odd = self.cos * odd - self.sin * even;
+        (
+            self.even * turned_even + self.odd * turned_odd.times_i(),
+            self.even * turned_odd - self.odd * turned_even.times_i(),
+        )
+    }
+}
+
 /// Takes a side over a site: seven slabs before their transform. With `DUALS` the site meets the other
 /// side, `opposite`, and adds to the derivatives of its own weights.
 #[inline(always)]
@@ -130,28 +164,28 @@ pub(super) fn pass_site<const DUALS: bool>(
             continue;
         }
         let phase = C4 { re: phases.re[block], im: phases.im[block] };
-        let parts = load(side, blocks, block, other).map(|part| phase * part);
+        let [a, b, c, d, e, f] = load_side(side, blocks, block, other);
+        let parts = [phase * a, phase * b, phase * c, phase * d, phase * e, phase * f];
         let norm = parts[0];
         let pull = Pull::new(parts, joint, mixers, h);
         let (even, odd) = (mixers.even[block], mixers.odd[block]);
-        let (z_even, z_odd) = (mixers.z_even[block], mixers.z_odd[block]);
-        // The quantum states of the last layer: phase of the field, then mixer and measured Z.
-        let quantum = |a: C4, b: C4| {
-            let even = (measure * turn_cos) * a + (measure * turn_sin) * b;
-            let odd = (measure * turn_cos) * b - (measure * turn_sin) * a;
-            (z_even * even + z_odd * odd.times_i(), z_even * odd - z_odd * even.times_i())
+        let quantum = Quantum {
+            even: mixers.z_even[block],
+            odd: mixers.z_odd[block],
+            cos: measure * turn_cos,
+            sin: measure * turn_sin,
         };
-        let (z, zr) = quantum(pull.norm_even, pull.norm_odd);
-        let (energy_q, energy_r) = quantum(pull.zq_even, pull.zq_odd);
+        let (z, z_odd) = quantum.apply(pull.norm_even, pull.norm_odd);
+        let (energy_q, energy_odd) = quantum.apply(pull.zq_even, pull.zq_odd);
         let energy = even * (pull.energy + mixers.cos * pull.z_odd)
             + odd * (pull.energy_odd + mixers.cos * pull.z_even)
             + next.cos * energy_q;
-        let all = [even * norm, odd * norm, z, zr, energy, energy_r, energy_q];
+        let all = [even * norm, odd * norm, z, z_odd, energy, energy_odd, energy_q];
         for (k, value) in all.into_iter().enumerate() {
             store(&mut spectrum[k * blocks..(k + 1) * blocks], block, other, value);
         }
         if DUALS {
-            let parts = load(opposite, blocks, block, other);
+            let parts = load_side(opposite, blocks, block, other);
             let weight = if other == block { 0.5 } else { 1.0 };
             let (norm_there, there) = (parts[0], Pull::new(parts, next, mixers, 0.0));
             let q_even = pull.zq_even * there.norm_even - pull.zq_odd * there.norm_odd
@@ -211,8 +245,9 @@ pub(super) fn end_of_chain(side: &mut Slab, blocks: usize) {
 /// Sets up a bond for spectra.
 #[inline(always)]
 pub(super) fn set_bond(bond: &mut Bond, mixers: &Mixers, j: f64, signs: &Slab, factors: &mut Slab) {
-    let order = super::folded::spectrum_order(mixers.inner());
-    bond.set(order.map(|layer| (2.0 * mixers.gammas[layer] * j).sin_cos()));
+    let turns =
+        (0..mixers.inner()).map(|place| (2.0 * mixers.gammas[layer_at(place)] * j).sin_cos());
+    bond.set(turns);
     bond.factors(signs, factors);
 }
 
