@@ -1,7 +1,6 @@
 //! The legs of a mission: every stretch between two places that its items can make a vehicle fly.
 //!
-//! The types are here; [`super::itinerary`] follows the items. What is inside the rules and what is
-//! not:
+//! The types are here; `itinerary` follows the items. What is inside the rules and what is not:
 //!
 //! - A mission that begins with a takeoff begins where the vehicle stands (or at home); any other
 //!   begins at its first place, and the way there is not the mission's.
