@@ -173,7 +173,8 @@ pub(super) fn number(index: usize) -> usize {
 /// The legs of a mission and what is to be said about them.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MissionLegs {
-    /// The legs by the item that they start from; those of the returns last.
+    /// The legs in the order of the items whose places they start from, those from the start
+    /// first; places that no leg touches last.
     pub legs: Vec<Leg>,
     /// What was assumed, in the order of the items.
     pub warnings: Vec<LegWarning>,
