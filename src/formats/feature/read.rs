@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::{DEFAULT_ROUTE_ALTITUDE, Feature, Shape, Want};
-use crate::fence::items::{open_ring, radius};
+use crate::fence::items::{distinct_ring, radius};
 use crate::fence::{FenceRegion, FenceRole, FenceShape};
 use crate::formats::error::{Located, Place, Problem};
 use crate::formats::item::{FileItem, float, index_in, jumps_to_indices, natural};
@@ -518,7 +518,7 @@ fn ring(vertices: &[LatLon], what: &str) -> Result<Vec<LatLon>, Problem> {
             expected: "at least 3; draw it again or delete it",
         });
     }
-    Ok(open_ring(vertices.to_vec()))
+    Ok(distinct_ring(vertices.to_vec()))
 }
 
 fn twice(what: &str) -> Problem {

@@ -6,7 +6,7 @@ use std::collections::hash_map::Entry;
 use serde::Deserialize;
 
 use super::{OBJECT_VERSION, complex};
-use crate::fence::items::{open_ring, radius};
+use crate::fence::items::{distinct_ring, radius};
 use crate::fence::{FenceRegion, FenceRole, FenceSet, FenceShape};
 use crate::formats::error::{Located, Place, Problem};
 use crate::formats::item::{FileItem, float, jumps_to_indices, natural, place};
@@ -164,19 +164,28 @@ fn read_mission(mission: PlanMission, warnings: &mut Vec<String>) -> Result<Miss
     Ok(Mission { home, items })
 }
 
-/// `[lat, lon, amsl]`; nulls, and zeros as a plan without a home has them, are no home.
-fn home(position: &[Number]) -> Result<Option<Home>, Problem> {
-    match position {
-        [None, ..] | [_, None, ..] | [Some(0.0), Some(0.0), ..] => Ok(None),
+/// Home; zeros, as a plan without a home has them, are no home.
+fn home(coordinate: &[Number]) -> Result<Option<Home>, Problem> {
+    let home = place_with_altitude("home", coordinate)?
+        .map(|(position, altitude_amsl)| Home { position, altitude_amsl });
+    Ok(home.filter(|home| (home.position.lat(), home.position.lon()) != (0.0, 0.0)))
+}
+
+/// `[lat, lon, altitude]`, and nothing where a null says so.
+fn place_with_altitude(
+    what: &str,
+    coordinate: &[Number],
+) -> Result<Option<(LatLon, f32)>, Problem> {
+    match coordinate {
+        [None, ..] | [_, None, ..] => Ok(None),
         [Some(lat), Some(lon), rest @ ..] => {
-            let position = place("home", *lat, *lon)?;
+            let position = place(what, *lat, *lon)?;
             let altitude = rest.first().copied().flatten().unwrap_or(0.0);
-            let altitude_amsl = float(altitude, || "altitude of home".to_owned())?;
-            Ok(Some(Home { position, altitude_amsl }))
+            Ok(Some((position, float(altitude, || format!("the altitude of {what}"))?)))
         }
         _ => Err(Problem::Value {
-            what: "the position".to_owned(),
-            found: format!("{} numbers", position.len()),
+            what: what.to_owned(),
+            found: format!("{} numbers", coordinate.len()),
             expected: "[latitude, longitude, altitude]",
         }),
     }
@@ -328,8 +337,8 @@ fn read_fence(
         fences.regions.push(FenceRegion { role: role(*inclusion), shape, origin });
     }
     if let Some(point) = breach_return {
-        fences.return_point =
-            return_point(&point).map_err(|problem| problem.at(Place::ReturnPoint))?;
+        fences.return_point = place_with_altitude("return point", &point)
+            .map_err(|problem| problem.at(Place::ReturnPoint))?;
     }
     Ok(fences)
 }
@@ -358,7 +367,7 @@ fn ring(vertices: &[Vec<f64>]) -> Result<Vec<LatLon>, Problem> {
             expected: "at least 3; draw the polygon again or delete it",
         });
     }
-    Ok(open_ring(ring))
+    Ok(distinct_ring(ring))
 }
 
 fn read_circle(circle: &Circle) -> Result<FenceShape, Problem> {
@@ -376,11 +385,6 @@ fn read_circle(circle: &Circle) -> Result<FenceShape, Problem> {
         expected: "positive and at most 8000 km",
     })?;
     Ok(FenceShape::Circle { centre, radius })
-}
-
-fn return_point(point: &[Number]) -> Result<Option<(LatLon, f32)>, Problem> {
-    let Some(Home { position, altitude_amsl }) = home(point)? else { return Ok(None) };
-    Ok(Some((position, altitude_amsl)))
 }
 
 fn read_rally(points: &[Vec<Number>]) -> Result<Vec<MissionItem>, Located> {
