@@ -6,7 +6,8 @@
 //! differently from how it may have been meant is in [`Scenario::warnings`].
 //!
 //! All positions are rounded to the 1e-7 degrees that a flight controller stores, so a mission
-//! planned from a file and one planned from the vehicle are the same.
+//! planned from a file and one planned from the vehicle are the same. Frames are those in degrees
+//! (0, 3, 10), read as well as written: their `_INT` twins differ only on the wire.
 
 pub mod error;
 mod feature;

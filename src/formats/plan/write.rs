@@ -63,7 +63,7 @@ fn item(index: usize, item: &MissionItem) -> Value {
     object.insert("frame".to_owned(), json!(frame));
     object.insert("params".to_owned(), params.map(json_number).to_vec().into());
     object.insert("autoContinue".to_owned(), json!(autocontinue));
-    if let Some(mode) = altitude_mode(item.frame) {
+    if let Some(mode) = altitude_mode(Frame(frame)) {
         object.insert("AltitudeMode".to_owned(), json!(mode));
         object.insert("Altitude".to_owned(), json_number(params[6]));
         object.insert("AMSLAltAboveTerrain".to_owned(), Value::Null);
@@ -74,9 +74,9 @@ fn item(index: usize, item: &MissionItem) -> Value {
 /// QGroundControl's `AltitudeMode` of a frame with an altitude.
 fn altitude_mode(frame: Frame) -> Option<u8> {
     match frame {
-        Frame::GLOBAL_RELATIVE_ALT | Frame::GLOBAL_RELATIVE_ALT_INT => Some(1),
-        Frame::GLOBAL | Frame::GLOBAL_INT => Some(2),
-        Frame::GLOBAL_TERRAIN_ALT | Frame::GLOBAL_TERRAIN_ALT_INT => Some(4),
+        Frame::GLOBAL_RELATIVE_ALT => Some(1),
+        Frame::GLOBAL => Some(2),
+        Frame::GLOBAL_TERRAIN_ALT => Some(4),
         _ => None,
     }
 }
