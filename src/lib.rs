@@ -24,6 +24,7 @@ pub mod mission;
 pub mod planner;
 pub mod qaoa;
 pub mod replan;
+pub mod report;
 pub mod store;
 pub mod units;
 pub mod vehicle;

@@ -1,16 +1,19 @@
 //! `quavd check`: judge any mission against any fences.
 
 use std::path::PathBuf;
+use std::time::Instant;
 
 use clap::Args;
 
 use super::CliError;
 use super::files;
 use super::options::SafetyArgs;
-use super::plan::{autopilot_of, position_of_start};
+use super::plan::{position_of_start, to_json};
 use super::progress::Shown;
 use crate::replan::{Input, judge};
-use crate::report;
+use crate::report::Run;
+use crate::report::json::CheckDocument;
+use crate::report::summary::check_summary;
 
 /// The arguments of `quavd check`.
 #[derive(Debug, Args)]
@@ -32,6 +35,7 @@ pub struct CheckArgs {
 /// # Errors
 /// [`CliError`]: exit code 3 where the mission is not clear.
 pub fn run(args: &CheckArgs, shown: &Shown) -> Result<String, CliError> {
+    let began = Instant::now();
     let mut scenario = files::scenario(&args.scenario, &args.safety)?;
     if let Some(path) = &args.mission {
         scenario.mission = files::mission(path)?;
@@ -39,20 +43,29 @@ pub fn run(args: &CheckArgs, shown: &Shown) -> Result<String, CliError> {
     if scenario.mission.items.is_empty() {
         return Err(files::FileError::NoMission(args.scenario.clone()).into());
     }
+    let load = began.elapsed();
     let rally = super::once::rally_places(&scenario.rally)?;
     let input = Input {
         mission: &scenario.mission,
         fences: &scenario.fences,
         rally: &rally,
         start: position_of_start(&scenario),
-        autopilot: autopilot_of(&scenario),
+        autopilot: scenario.vehicle.autopilot,
     };
-    let verdict = judge(&input, &args.safety.options())?;
+    let options = args.safety.options();
+    let verdict = judge(&input, &options)?;
     shown.warn(&scenario.warnings);
+    let run = Run {
+        options: &options,
+        warnings: &scenario.warnings,
+        fallback: None,
+        load,
+        total: began.elapsed(),
+    };
     let text = if args.json {
-        report::check_json(&verdict, args.safety.buffer, &scenario.warnings)
+        to_json(&CheckDocument::new(&verdict, &run))?
     } else {
-        report::check_summary(&verdict, args.safety.buffer)
+        check_summary(&verdict, &run)
     };
     if verdict.is_clear() {
         Ok(text)

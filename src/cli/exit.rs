@@ -4,7 +4,7 @@ use std::io::Write;
 use std::process::ExitCode;
 
 use crate::cli::files::FileError;
-use crate::cli::qaoa::QaoaCommandError;
+//QQ use crate::cli::qaoa::QaoaCommandError;
 use crate::fence::items::FenceItemError;
 use crate::formats::FormatError;
 use crate::link::LinkError;
@@ -82,12 +82,16 @@ macro_rules! usage_errors {
     )*};
 }
 
-usage_errors!(FileError, FormatError, FenceItemError, QaoaCommandError, StoreError);
+usage_errors!(FileError, FormatError, FenceItemError, /*QQ QaoaCommandError,*/ StoreError);
 
 impl From<ReplanError> for CliError {
     fn from(error: ReplanError) -> Self {
         let reason = error.to_string();
-        if error.is_no_path() { Self::NoPath { reason, document: None } } else { Self::Usage(reason) }
+        if error.is_no_path() {
+            Self::NoPath { reason, document: None }
+        } else {
+            Self::Usage(reason)
+        }
     }
 }
 

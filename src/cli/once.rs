@@ -11,7 +11,7 @@ use tokio_util::sync::CancellationToken;
 use super::CliError;
 use super::files::{self, out_format};
 use super::options::PlanningArgs;
-use super::plan::{Outcome, planned_scenario};
+use super::plan::{Delivered, Outcome, planned_scenario};
 use super::progress::Shown;
 use crate::fence::FenceSet;
 use crate::fence::items::decode_fence;
@@ -121,10 +121,10 @@ async fn with_vehicle(
     }
     if !args.dry_run {
         for plan in [MissionType::Fence, MissionType::Mission] {
-            let settled =
-                settle(vehicle, store, plan, WhileArmed::Refuse, &mut on_step).await?;
+            let settled = settle(vehicle, store, plan, WhileArmed::Refuse, &mut on_step).await?;
             if let Some(settled) = settled {
-                shown.warn(&[format!("an earlier upload of the {plan} was not settled: {settled}")]);
+                shown
+                    .warn(&[format!("an earlier upload of the {plan} was not settled: {settled}")]);
             }
         }
     }
@@ -140,20 +140,20 @@ async fn with_vehicle(
     }
     let load = began.elapsed();
     let planned = plan_off_thread(&read, &options, shown).await;
-    let outcome = Outcome { planned, options: &options, load, total: began.elapsed() };
+    let warnings = &read.scenario.warnings;
+    let outcome = Outcome { planned, options: &options, warnings, load, total: began.elapsed() };
 
     let mut done = Delivery { written: false, verified: false };
     if let Ok(planned) = &outcome.planned {
-        let home_slot = (vehicle.autopilot() == Autopilot::ArduPilot)
-            .then(|| read.held.first())
-            .flatten();
+        let home_slot =
+            (vehicle.autopilot() == Autopilot::ArduPilot).then(|| read.held.first()).flatten();
         let intended = if planned.is_changed() {
             to_vehicle(vehicle.autopilot(), &planned.mission, home_slot)
         } else {
             read.original.clone()
         };
-        let same =
-            differences(vehicle.autopilot(), MissionType::Mission, &intended, &read.held).is_empty();
+        let same = differences(vehicle.autopilot(), MissionType::Mission, &intended, &read.held)
+            .is_empty();
         done.verified = same;
         if !same && !args.dry_run {
             let replacement = Replacement {
@@ -166,11 +166,9 @@ async fn with_vehicle(
             done = Delivery { written: true, verified: true };
         }
         shown.clear();
-        files::write_all(&args.out, &planned_scenario(&read.scenario, planned), || {
-            outcome.picture(planned, &read.scenario.fences)
-        })?;
+        files::write_all(&args.out, &planned_scenario(&read.scenario, planned), || String::new())?;
     }
-    outcome.told(args.json, &read.scenario.fences, Some(done.told(vehicle, args.dry_run)))
+    outcome.told(args.json, Some(done.told(vehicle, args.dry_run)))
 }
 
 /// What `--restore` does: both plans that quavd may have written.
@@ -211,7 +209,8 @@ async fn read(
     let fence = vehicle.download(MissionType::Fence, &mut on_progress).await?.items;
     let rally = vehicle.download(MissionType::Rally, &mut on_progress).await?.items;
     shown.doing("waiting for the vehicle's home and position");
-    let known = |state: &crate::vehicle::VehicleState| state.home.is_some() && state.position.is_some();
+    let known =
+        |state: &crate::vehicle::VehicleState| state.home.is_some() && state.position.is_some();
     let _ = vehicle.wait_for(PLACE_PATIENCE, known).await;
     let state = vehicle.state();
 
@@ -224,11 +223,7 @@ async fn read(
     // The vehicle stands at home before it takes off; in flight its own place counts.
     let start = state.position.map(|at| at.position).or(mission.home.map(|home| home.position));
     let scenario = Scenario { mission, fences, rally, warnings, ..Scenario::default() };
-    let autopilot = match vehicle.autopilot() {
-        Autopilot::ArduPilot => mission::Autopilot::ArduPilot,
-        Autopilot::Px4 => mission::Autopilot::Px4,
-        Autopilot::Other(_) => mission::Autopilot::Unknown,
-    };
+    let autopilot = vehicle.autopilot().into();
     Ok(Read { scenario, held, original, start, rally: places, autopilot })
 }
 
@@ -278,7 +273,9 @@ async fn plan_off_thread(
     match finished {
         Ok(planned) => planned.map_err(CliError::from),
         Err(panic) => Err(CliError::NoPath {
-            reason: format!("the planner failed ({panic}); nothing was written; please report this"),
+            reason: format!(
+                "the planner failed ({panic}); nothing was written; please report this"
+            ),
             document: None,
         }),
     }
@@ -292,19 +289,19 @@ struct Delivery {
 }
 
 impl Delivery {
-    fn told(self, vehicle: &Vehicle, dry_run: bool) -> super::plan::Delivered {
+    fn told(self, vehicle: &Vehicle, dry_run: bool) -> Delivered {
         let note = match (self.written, self.verified, dry_run) {
             (true, ..) => "uploaded, read back and compared: the vehicle holds it",
             (false, true, _) => "the vehicle already holds it: nothing was written",
             (false, false, true) => "dry run: nothing was written",
             (false, false, false) => "nothing was written to the vehicle",
         };
-        super::plan::Delivered {
+        Delivered {
             system: vehicle.node().system.0,
             autopilot: vehicle.autopilot().to_string(),
             uploaded: self.written,
             verified: self.verified,
-            note: note.to_owned(),
+            note,
         }
     }
 }
@@ -319,7 +316,6 @@ fn state_directory(chosen: Option<&PathBuf>) -> Result<PathBuf, CliError> {
         .map(PathBuf::from)
         .filter(|path| path.is_absolute())
         .or_else(|| std::env::home_dir().map(|home| home.join(".local/state")));
-    base.map(|base| base.join("quavd")).ok_or_else(|| {
-        CliError::Usage("no place for records: give --state-dir DIR".to_owned())
-    })
+    base.map(|base| base.join("quavd"))
+        .ok_or_else(|| CliError::Usage("no place for records: give --state-dir DIR".to_owned()))
 }

@@ -38,7 +38,10 @@ pub struct ZoneChoice(pub Option<Zone>);
 fn zone(text: &str) -> Result<ZoneChoice, String> {
     match text {
         "auto" => Ok(ZoneChoice(None)),
-        text => text.parse().map(|zone| ZoneChoice(Some(zone))).map_err(|e: crate::geodesy::ZoneError| e.to_string()),
+        text => text
+            .parse()
+            .map(|zone| ZoneChoice(Some(zone)))
+            .map_err(|e: crate::geodesy::ZoneError| e.to_string()),
     }
 }
 

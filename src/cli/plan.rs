@@ -5,19 +5,18 @@ use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use clap::Args;
+use serde::Serialize;
 
 use super::CliError;
 use super::files::{self, out_format};
 use super::options::PlanningArgs;
 use super::progress::Shown;
-use crate::fence::FenceSet;
-use crate::formats::{Firmware, Scenario};
+use crate::formats::Scenario;
 use crate::geodesy::LatLon;
-use crate::mission::Autopilot;
 use crate::replan::{Input, Options, Progress, Replanned, replan};
-use crate::report;
-
-pub use crate::report::Delivered;
+use crate::report::Run;
+use crate::report::json::PlanDocument;
+use crate::report::summary::plan_summary;
 
 /// The arguments of `quavd plan`.
 #[derive(Debug, Args)]
@@ -57,7 +56,7 @@ pub fn run(args: &PlanArgs, shown: &Shown) -> Result<String, CliError> {
         fences: &scenario.fences,
         rally: &rally,
         start: position_of_start(&scenario),
-        autopilot: autopilot_of(&scenario),
+        autopilot: scenario.vehicle.autopilot,
     };
     let load = began.elapsed();
     let mut leg = String::new();
@@ -65,27 +64,17 @@ pub fn run(args: &PlanArgs, shown: &Shown) -> Result<String, CliError> {
     let planned = replan(&input, &options, &AtomicBool::new(false), watch);
     let planned = planned.map_err(CliError::from);
     shown.clear();
-    let outcome = Outcome { planned, options: &options, load, total: began.elapsed() };
+    let warnings = &scenario.warnings;
+    let outcome = Outcome { planned, options: &options, warnings, load, total: began.elapsed() };
     if let Ok(planned) = &outcome.planned {
-        files::write_all(&args.out, &planned_scenario(&scenario, planned), || {
-            outcome.picture(planned, &scenario.fences)
-        })?;
+        files::write_all(&args.out, &planned_scenario(&scenario, planned), || String::new())?;
     }
-    outcome.told(args.json, &scenario.fences, None)
+    outcome.told(args.json, None)
 }
 
 /// Where a file's vehicle stands: home, where the file has one.
 pub(super) fn position_of_start(scenario: &Scenario) -> Option<LatLon> {
     scenario.mission.home.map(|home| home.position)
-}
-
-/// The autopilot that a file says it is for.
-pub(super) fn autopilot_of(scenario: &Scenario) -> Autopilot {
-    match scenario.vehicle.firmware {
-        Firmware::ArduPilot => Autopilot::ArduPilot,
-        Firmware::Px4 => Autopilot::Px4,
-        Firmware::Unknown => Autopilot::Unknown,
-    }
 }
 
 /// The scenario with the planned mission in place of its own.
@@ -97,34 +86,77 @@ pub(super) fn planned_scenario(scenario: &Scenario, planned: &Replanned) -> Scen
 pub(super) struct Outcome<'a> {
     pub(super) planned: Result<Replanned, CliError>,
     pub(super) options: &'a Options,
+    /// What was odd about the input.
+    pub(super) warnings: &'a [String],
     pub(super) load: Duration,
     pub(super) total: Duration,
 }
 
+/// What became of the plan on a vehicle.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Delivered {
+    /// The vehicle's system id.
+    pub(super) system: u8,
+    /// Its flight software.
+    pub(super) autopilot: String,
+    /// Whether anything was written to it.
+    pub(super) uploaded: bool,
+    /// Whether it was read back and is what was planned.
+    pub(super) verified: bool,
+    /// The same in words.
+    #[serde(skip)]
+    pub(super) note: &'static str,
+}
+
+/// The document of `--json`.
+#[derive(Serialize)]
+struct Document {
+    #[serde(flatten)]
+    plan: PlanDocument,
+    /// Only of `quavd once`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    vehicle: Option<Delivered>,
+}
+
 impl Outcome<'_> {
     /// The text for stdout, or the error with its document.
-    pub(super) fn told(
-        self,
-        json: bool,
-        fences: &FenceSet,
-        delivered: Option<Delivered>,
-    ) -> Result<String, CliError> {
-        let timings = report::Timings { load: self.load, total: self.total };
+    pub(super) fn told(self, json: bool, delivered: Option<Delivered>) -> Result<String, CliError> {
+        let run = Run {
+            options: self.options,
+            warnings: self.warnings,
+            fallback: None,
+            load: self.load,
+            total: self.total,
+        };
         match self.planned {
-            Ok(planned) if json => {
-                Ok(report::plan_json(&planned, self.options, timings, delivered.as_ref()))
+            Ok(planned) if json => document(PlanDocument::planned(&planned, &run), delivered),
+            Ok(planned) => {
+                let mut text = plan_summary(&planned, &run);
+                if let Some(delivered) = delivered {
+                    text.push_str(&format!("Vehicle {}: {}.\n", delivered.system, delivered.note));
+                }
+                Ok(text)
             }
-            Ok(planned) => Ok(report::summary(&planned, fences, self.options, timings, delivered.as_ref())),
             Err(CliError::NoPath { reason, .. }) => {
-                let document = json.then(|| report::no_path_json(&reason, self.options, timings));
+                let document = json
+                    .then(|| document(PlanDocument::failed(&reason, None, &run), delivered))
+                    .transpose()?;
                 Err(CliError::NoPath { reason, document })
             }
             Err(other) => Err(other),
         }
     }
+}
 
-    /// The picture of a plan.
-    pub(super) fn picture(&self, planned: &Replanned, fences: &FenceSet) -> String {
-        report::svg(planned, fences, self.options)
-    }
+fn document(plan: PlanDocument, vehicle: Option<Delivered>) -> Result<String, CliError> {
+    to_json(&Document { plan, vehicle })
+}
+
+/// A document as one line of JSON.
+pub(super) fn to_json(document: &impl Serialize) -> Result<String, CliError> {
+    let mut text = serde_json::to_string(document).map_err(|error| {
+        CliError::Usage(format!("the result cannot be written as JSON: {error}"))
+    })?;
+    text.push('\n');
+    Ok(text)
 }

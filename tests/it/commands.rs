@@ -49,8 +49,7 @@ impl Field {
     fn once(&self, more: &[&str]) -> Output {
         let url = self.vehicle.endpoint().to_string();
         let state = self.state.path().to_string_lossy().into_owned();
-        let mut arguments =
-            vec!["once", "--connect", &url, "--state-dir", &state, "--system", "1"];
+        let mut arguments = vec!["once", "--connect", &url, "--state-dir", &state, "--system", "1"];
         arguments.extend(more);
         quavd(&arguments)
     }
@@ -80,7 +79,12 @@ fn all_six_over(link: &str, persona: &str) {
         let mut field = Field::new(link, persona, name);
         let output = field.once(&["--json"]);
         let what = format!("{name} {persona} {link}");
-        assert_eq!(output.status.code(), Some(0), "{what}: {}", String::from_utf8_lossy(&output.stderr));
+        assert_eq!(
+            output.status.code(),
+            Some(0),
+            "{what}: {}",
+            String::from_utf8_lossy(&output.stderr)
+        );
         let verdict = field.judged();
         assert_eq!(verdict["collisions"], 0, "{what}: {verdict}");
         assert!(verdict["min_clearance_m"].as_f64().unwrap() >= 4.99, "{what}: {verdict}");

@@ -9,8 +9,9 @@ use super::fence::{GeoFence, read_fence};
 use super::{OBJECT_VERSION, complex};
 use crate::formats::error::{Located, Place, Problem};
 use crate::formats::item::{FileItem, float, jumps_to_indices, natural, place};
-use crate::formats::{Firmware, MAX_ITEMS, Scenario, VehicleHint};
+use crate::formats::{MAX_ITEMS, Scenario, VehicleHint};
 use crate::geodesy::LatLon;
+use crate::mission::Autopilot;
 use crate::mission::{Command, Frame, Home, Mission, MissionItem};
 
 /// `null` is NaN, as QGroundControl writes "unset".
@@ -89,10 +90,10 @@ fn vehicle(mission: &PlanMission) -> VehicleHint {
     let default = VehicleHint::default();
     let speed = |value: Number, default| value.filter(|v| v.is_finite()).unwrap_or(default);
     VehicleHint {
-        firmware: match mission.firmware_type {
-            Some(3.0) => Firmware::ArduPilot,
-            Some(12.0) => Firmware::Px4,
-            _ => Firmware::Unknown,
+        autopilot: match mission.firmware_type {
+            Some(3.0) => Autopilot::ArduPilot,
+            Some(12.0) => Autopilot::Px4,
+            _ => Autopilot::Unknown,
         },
         vehicle_type: mission
             .vehicle_type

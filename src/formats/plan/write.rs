@@ -4,10 +4,11 @@ use serde_json::{Map, Value, json};
 
 use crate::fence::items::{FenceItemProblem, radius};
 use crate::fence::{FenceRole, FenceShape};
+use crate::formats::Scenario;
 use crate::formats::error::{Place, WriteError};
 use crate::formats::item::{FileItem, decimal, json_number, jumps_from_indices};
-use crate::formats::{Firmware, Scenario};
 use crate::geodesy::LatLon;
+use crate::mission::Autopilot;
 use crate::mission::{Command, Frame, MissionItem};
 
 /// The scenario as a `.plan`: mission with planned home, geoFence, rally points. Polygons stand
@@ -30,10 +31,10 @@ pub fn write_plan(scenario: &Scenario) -> Result<String, WriteError> {
 
 fn mission(scenario: &Scenario) -> Result<Value, WriteError> {
     let vehicle = &scenario.vehicle;
-    let firmware = match vehicle.firmware {
-        Firmware::Unknown => 0,
-        Firmware::ArduPilot => 3,
-        Firmware::Px4 => 12,
+    let firmware = match vehicle.autopilot {
+        Autopilot::Unknown => 0,
+        Autopilot::ArduPilot => 3,
+        Autopilot::Px4 => 12,
     };
     let home = match scenario.mission.home {
         Some(home) => {

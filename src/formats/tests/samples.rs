@@ -3,7 +3,8 @@
 use proptest::prelude::*;
 
 use crate::fence::samples::{fence_set, position};
-use crate::formats::{Firmware, Scenario, VehicleHint};
+use crate::formats::{Scenario, VehicleHint};
+use crate::mission::Autopilot;
 use crate::mission::{Command, Frame, Home, Mission, MissionItem};
 
 fn altitude() -> impl Strategy<Value = f32> {
@@ -103,7 +104,7 @@ pub(super) fn scenario() -> impl Strategy<Value = Scenario> {
         mission: Mission { home, items },
         fences,
         rally,
-        vehicle: VehicleHint { firmware: Firmware::ArduPilot, ..VehicleHint::default() },
+        vehicle: VehicleHint { autopilot: Autopilot::ArduPilot, ..VehicleHint::default() },
         warnings: Vec::new(),
     })
 }
