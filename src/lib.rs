@@ -12,6 +12,7 @@
 //! - [`planner`]: one leg: candidates, QAOA rounds, finish;
 //! - [`qaoa`]: Ising problems and the engines that run the circuit;
 //! - [`replan`]: a whole mission, and the judgement of any mission;
+//! - [`report`]: what is said and shown about it: JSON, a summary, a picture;
 //! - [`cli`]: the commands of `quavd`.
 
 pub mod airspace;
@@ -24,6 +25,7 @@ pub mod mission;
 pub mod planner;
 pub mod qaoa;
 pub mod replan;
+pub mod report;
 pub mod store;
 pub mod units;
 pub mod vehicle;

@@ -167,7 +167,7 @@ impl fmt::Display for LegName {
 }
 
 /// What a message calls an item: ground stations count home as 0 and the first command as 1.
-pub(super) fn number(index: usize) -> usize {
+pub(crate) fn number(index: usize) -> usize {
     index + 1
 }
 
