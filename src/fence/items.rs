@@ -151,7 +151,7 @@ pub fn decode_fence(
                 }
                 let origin = format!("{prefix}fence items {index}-{}", index + count - 1);
                 warn_of_group(item, &origin, &mut decoded.warnings);
-                let shape = FenceShape::Polygon(open_ring(ring));
+                let shape = FenceShape::Polygon(distinct_ring(ring));
                 decoded.fences.regions.push(FenceRegion { role: role(item), shape, origin });
                 index += count;
             }
@@ -222,11 +222,15 @@ pub(crate) fn radius(metres: f64) -> Result<Metres, FenceItemProblem> {
     }
 }
 
-/// A ring without the repeated first vertex at its end. A ring of three vertices keeps it: that is
-/// a wall, and too short to lose one.
-pub(crate) fn open_ring(mut ring: Vec<LatLon>) -> Vec<LatLon> {
-    while ring.len() > 3 && ring.first() == ring.last() {
+/// A ring without vertices that repeat the one before, nor the first one at the end. A ring of
+/// fewer than three places is a wall: its last vertex is repeated so that it is still a polygon.
+pub(crate) fn distinct_ring(mut ring: Vec<LatLon>) -> Vec<LatLon> {
+    ring.dedup();
+    while ring.len() > 1 && ring.first() == ring.last() {
         ring.pop();
+    }
+    while let Some(last) = ring.last().copied().filter(|_| ring.len() < 3) {
+        ring.push(last);
     }
     ring
 }
@@ -400,6 +404,14 @@ mod tests {
         let decoded = decode_fence(&items, None).unwrap();
         let FenceShape::Polygon(ring) = &decoded.fences.regions[0].shape else { panic!() };
         assert_eq!(ring.len(), 3);
+    }
+
+    #[test]
+    fn a_ring_of_fewer_than_three_places_stays_a_polygon() {
+        let [a, b] = [1, 2].map(|lat| LatLonE7 { lat, lon: 0 }.to_degrees().unwrap());
+        assert_eq!(distinct_ring(vec![a, a, b, b, a, a]), [a, b, b]);
+        assert_eq!(distinct_ring(vec![a, b, b]), [a, b, b]);
+        assert_eq!(distinct_ring(vec![a, a, a, a]), [a, a, a]);
     }
 
     #[test]

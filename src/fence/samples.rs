@@ -2,6 +2,7 @@
 
 use proptest::prelude::*;
 
+use crate::fence::items::distinct_ring;
 use crate::fence::{FenceRegion, FenceRole, FenceSet, FenceShape};
 use crate::geodesy::{LatLon, LatLonE7};
 use crate::units::Metres;
@@ -14,8 +15,7 @@ pub(crate) fn position() -> impl Strategy<Value = LatLon> {
 
 fn shape() -> impl Strategy<Value = FenceShape> {
     let polygon = prop::collection::vec(position(), 3..8)
-        .prop_filter("a ring is not closed", |ring| ring.first() != ring.last())
-        .prop_map(FenceShape::Polygon);
+        .prop_map(|ring| FenceShape::Polygon(distinct_ring(ring)));
     let circle = (position(), 1u32..80_000).prop_map(|(centre, eighths)| {
         // A multiple of an eighth: exact as the f32 of a fence item.
         FenceShape::Circle { centre, radius: Metres(f64::from(eighths) / 8.0) }

@@ -1,6 +1,6 @@
 //! GeoJSON features and KML placemarks are the same thing in two syntaxes: a shape with
-//! properties. This file holds that common form; [`read`] makes a scenario of features,
-//! [`write`] makes features of a scenario.
+//! properties. This file holds that common form; [`read`] makes a scenario of features
+//! ([`properties`] says what each is, [`order`] in which order they are flown), [`write`] the reverse.
 //!
 //! Properties that are read (in KML: `ExtendedData`):
 //!
@@ -19,6 +19,8 @@
 //! `MAV_FRAME_GLOBAL_RELATIVE_ALT`. A point with `command`, `frame` and `params` is that mission
 //! item. A line with role `track` is a picture of the route and not read.
 
+mod order;
+mod properties;
 mod read;
 #[cfg(test)]
 mod tests;

@@ -5,7 +5,7 @@
 use super::error::{Located, Place, Problem};
 use super::item::place;
 use super::{MAX_VERTICES, Scenario};
-use crate::fence::items::open_ring;
+use crate::fence::items::distinct_ring;
 use crate::fence::{FenceRegion, FenceRole, FenceSet, FenceShape};
 
 /// Whether a line is two numbers, as every line of this format is.
@@ -65,7 +65,7 @@ pub(super) fn read(name: &str, text: &str) -> Result<Scenario, Located> {
     }
     let region = FenceRegion {
         role: FenceRole::Inclusion,
-        shape: FenceShape::Polygon(open_ring(ring.to_vec())),
+        shape: FenceShape::Polygon(distinct_ring(ring.to_vec())),
         origin: format!("{name} fence polygon"),
     };
     let fences = FenceSet { regions: vec![region], return_point };

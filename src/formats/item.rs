@@ -29,7 +29,7 @@ impl FileItem {
     /// The item for the wire, with `seq`. `current` is 0: which item to start with is not a
     /// matter of a file, and 2 or 3 would make ArduPilot fly there at once.
     pub(super) fn to_item(&self, seq: u16) -> Result<MissionItem, Problem> {
-        let frame = Frame(self.frame);
+        let frame = in_degrees(Frame(self.frame));
         let command = Command(self.command);
         let [p1, p2, p3, p4, p5, p6, p7] = self.params;
         let mut params = [0.0; 4];
@@ -66,10 +66,20 @@ impl FileItem {
         };
         Self {
             command: item.command.0,
-            frame: item.frame.0,
+            frame: in_degrees(item.frame).0,
             params: [p1, p2, p3, p4, p5, p6, decimal(item.z)],
             autocontinue: item.autocontinue != 0,
         }
+    }
+}
+
+/// The frame without its `_INT`: a file holds degrees, and ground stations edit only these.
+fn in_degrees(frame: Frame) -> Frame {
+    match frame {
+        Frame::GLOBAL_INT => Frame::GLOBAL,
+        Frame::GLOBAL_RELATIVE_ALT_INT => Frame::GLOBAL_RELATIVE_ALT,
+        Frame::GLOBAL_TERRAIN_ALT_INT => Frame::GLOBAL_TERRAIN_ALT,
+        other => other,
     }
 }
 
@@ -192,5 +202,68 @@ pub(super) fn natural(value: f64, max: u16, what: &str) -> Result<u16, Problem> 
                 "a whole number from 0 to 65535"
             },
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn item(command: u16, frame: u8, params: [f64; 7]) -> MissionItem {
+        FileItem { command, frame, params, autocontinue: true }.to_item(0).unwrap()
+    }
+
+    #[test]
+    fn an_integer_frame_becomes_its_twin_in_degrees() {
+        let place = [0.0, 0.0, 0.0, 0.0, 47.0, 8.0, 30.0];
+        let frames = [5, 6, 11].map(|frame| item(16, frame, place).frame.0);
+        assert_eq!(frames, [0, 3, 10]);
+        let from_vehicle = MissionItem { frame: Frame(6), ..item(16, 3, place) };
+        assert_eq!(FileItem::from_item(&from_vehicle).frame, 3);
+    }
+
+    #[test]
+    fn camera_commands_and_frames_without_a_place_are_not_scaled() {
+        let shoot = [0.0, 0.0, 0.0, 0.0, 1.0, 7.0, 0.0];
+        assert_eq!((item(203, 3, shoot).x, item(203, 3, shoot).y), (1, 7));
+        assert_eq!(item(205, 2, shoot).x, 1);
+        assert_eq!(item(16, 3, shoot).x, 10_000_000);
+    }
+
+    #[test]
+    fn an_unset_place_is_here_and_needs_no_altitude() {
+        const UNSET: f64 = f64::NAN;
+        let land = item(21, 3, [0.0, 0.0, 0.0, UNSET, UNSET, UNSET, UNSET]);
+        assert_eq!((land.x, land.y), (0, 0));
+    }
+
+    #[test]
+    fn a_decimal_stays_the_decimal_it_was() {
+        assert_eq!(decimal(0.1), 0.1);
+        assert_eq!(json_number(5.0).to_string(), "5");
+        assert_eq!(json_number(-0.0).to_string(), "-0.0");
+        assert_eq!(json_number(f64::NAN), Value::Null);
+    }
+
+    #[test]
+    fn numbers_that_do_not_fit_are_errors() {
+        let too_large = |params| {
+            let item = FileItem { command: 178, frame: 3, params, autocontinue: true };
+            item.to_item(0).unwrap_err().to_string()
+        };
+        assert!(too_large([0.0, 1e39, 0.0, 0.0, 0.0, 0.0, 0.0]).starts_with("param 2 is"));
+        assert!(too_large([0.0, 0.0, 0.0, 0.0, 215.0, 0.0, 0.0]).starts_with("param 5"));
+        assert!(
+            too_large(
+                [0.0; 6]
+                    .iter()
+                    .copied()
+                    .chain([f64::INFINITY])
+                    .collect::<Vec<_>>()
+                    .try_into()
+                    .unwrap()
+            )
+            .starts_with("param 7")
+        );
     }
 }

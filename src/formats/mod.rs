@@ -6,7 +6,8 @@
 //! differently from how it may have been meant is in [`Scenario::warnings`].
 //!
 //! All positions are rounded to the 1e-7 degrees that a flight controller stores, so a mission
-//! planned from a file and one planned from the vehicle are the same.
+//! planned from a file and one planned from the vehicle are the same. Frames are those in degrees
+//! (0, 3, 10), read as well as written: their `_INT` twins differ only on the wire.
 
 pub mod error;
 mod feature;
@@ -25,7 +26,7 @@ pub use plan::write_plan;
 pub use waypoints::{write_waypoints, write_waypoints_fence, write_waypoints_rally};
 
 use crate::fence::FenceSet;
-use crate::mission::{Mission, MissionItem};
+use crate::mission::{Autopilot, Mission, MissionItem};
 use error::Located;
 use feature::Want;
 
@@ -58,7 +59,7 @@ pub struct Scenario {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VehicleHint {
     /// The autopilot.
-    pub firmware: Firmware,
+    pub autopilot: Autopilot,
     /// `MAV_TYPE` of the vehicle; 2 is a quadrotor.
     pub vehicle_type: u8,
     /// Planned speed of a fixed wing, metres per second.
@@ -70,20 +71,13 @@ pub struct VehicleHint {
 impl Default for VehicleHint {
     /// QGroundControl's own defaults: a multirotor, 15 m/s cruise, 5 m/s hover.
     fn default() -> Self {
-        Self { firmware: Firmware::Unknown, vehicle_type: 2, cruise_speed: 15.0, hover_speed: 5.0 }
+        Self {
+            autopilot: Autopilot::Unknown,
+            vehicle_type: 2,
+            cruise_speed: 15.0,
+            hover_speed: 5.0,
+        }
     }
-}
-
-/// The autopilot a `.plan` was drawn for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Firmware {
-    /// The file does not say.
-    #[default]
-    Unknown,
-    /// ArduPilot (`MAV_AUTOPILOT_ARDUPILOTMEGA`, 3).
-    ArduPilot,
-    /// PX4 (`MAV_AUTOPILOT_PX4`, 12).
-    Px4,
 }
 
 /// The fences of a file, and what its reader should be told.

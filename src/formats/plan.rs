@@ -2,9 +2,10 @@
 //!
 //! (QGroundControl developer guide, "Plan File Format".) Optional keys vary between versions, so
 //! what is not needed is not required. [`read`] and [`write`] hold one direction each,
-//! [`complex`] the items that stand for several.
+//! [`fence`] reads the geoFence and [`complex`] the items that stand for several.
 
 mod complex;
+mod fence;
 mod read;
 #[cfg(test)]
 mod tests;

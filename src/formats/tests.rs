@@ -176,14 +176,14 @@ proptest! {
 #[test]
 fn a_plan_keeps_the_vehicle_it_was_drawn_for() {
     let vehicle = VehicleHint {
-        firmware: Firmware::Px4,
+        autopilot: Autopilot::Px4,
         vehicle_type: 1,
         cruise_speed: 18.5,
         hover_speed: 4.0,
     };
     let scenario = Scenario { vehicle, ..Scenario::default() };
     assert_eq!(parse(&write_plan(&scenario).unwrap()).vehicle, vehicle);
-    assert_eq!(example("s1.plan").vehicle.firmware, Firmware::ArduPilot);
+    assert_eq!(example("s1.plan").vehicle.autopilot, Autopilot::ArduPilot);
 }
 
 #[test]

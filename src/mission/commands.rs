@@ -3,7 +3,7 @@
 //!
 //! Sources: MAVLink common and ardupilotmega `MAV_CMD` (`hasLocation`, `isDestination`) and
 //! ArduPilot `AP_Mission::is_nav_cmd`. What the items of a mission add up to is in
-//! [`super::legs`].
+//! [`super::legs()`].
 
 use super::item::{Command, MissionItem};
 use crate::units::Metres;

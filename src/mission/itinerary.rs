@@ -4,110 +4,28 @@
 //! next places. A walk visits an item at most once for each way that the vehicle can be there, so
 //! that loops end; the number of steps is bounded for missions that are made to be hostile.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use super::Mission;
 use super::altitude::Altitude;
 use super::autopilot::Autopilot;
-use super::commands::{Destination, LoiterHabit, Role, loiter_radius};
+use super::commands::{Destination, LoiterHabit, Role};
 use super::curve::{arc_bound, spline_bound};
 use super::insertion::insertion_point;
-use super::item::{Command, Frame, MissionItem};
+use super::item::{Command, MissionItem};
 use super::jumps::Jumps;
-use super::legs::{
-    FlightContext, Leg, LegEnd, LegError, LegKind, LegShape, LegWarning, MissionLegs, ReturnTo,
-};
+use super::legs::{FlightContext, Leg, LegEnd, LegError, LegKind, LegShape, MissionLegs, ReturnTo};
+use super::places::{places, radii, warning};
 use crate::geodesy::LatLon;
 use crate::units::Metres;
+
+mod state;
+
+use state::{Landing, State, Status, bits};
 
 /// The most legs, and the most steps for each of them on average, that a mission may take.
 const LEG_LIMIT: usize = 100_000;
 const STEP_LIMIT: usize = 40 * LEG_LIMIT;
-
-/// Whether the vehicle can fly on to a waypoint.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-enum Status {
-    /// Before the first place or takeoff.
-    Before,
-    Flying,
-    Landed,
-}
-
-/// A return that goes on in a landing sequence: the item that returned and where waypoints for it
-/// go.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-struct Landing {
-    entry: usize,
-    insert_before: Option<usize>,
-}
-
-/// Where a walk is: the vehicle's state as execution arrives at an item.
-#[derive(Debug, Clone, Copy)]
-struct State {
-    index: usize,
-    /// The last item of navigation.
-    navigation: Option<usize>,
-    position: Option<LatLon>,
-    altitude: Option<Altitude>,
-    circle: Metres,
-    status: Status,
-    jump: Option<usize>,
-    landing: Option<Landing>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-struct StateKey {
-    index: usize,
-    jumped: bool,
-    status: Status,
-    position: Option<[u64; 2]>,
-    circle: u64,
-    landing: Option<usize>,
-}
-
-fn bits(position: LatLon) -> [u64; 2] {
-    [position.lat().to_bits(), position.lon().to_bits()]
-}
-
-impl State {
-    fn start(position: Option<LatLon>) -> Self {
-        Self {
-            index: 0,
-            navigation: None,
-            position,
-            altitude: None,
-            circle: Metres::ZERO,
-            status: Status::Before,
-            jump: None,
-            landing: None,
-        }
-    }
-
-    fn after(item: usize, position: LatLon) -> Self {
-        Self {
-            index: item + 1,
-            navigation: Some(item),
-            status: Status::Flying,
-            ..Self::start(Some(position))
-        }
-    }
-
-    /// What tells apart the ways of being at an item within one walk.
-    fn key(&self) -> StateKey {
-        StateKey {
-            index: self.index,
-            jumped: self.jump.is_some(),
-            status: self.status,
-            position: self.position.map(bits),
-            circle: self.circle.0.to_bits(),
-            landing: self.landing.map(|landing| landing.entry),
-        }
-    }
-
-    fn end(&self, position: LatLon) -> LegEnd {
-        LegEnd { item: self.navigation, position, altitude: self.altitude, circle: self.circle }
-    }
-}
 
 /// The mission as it is walked.
 struct Itinerary<'a> {
@@ -117,6 +35,8 @@ struct Itinerary<'a> {
     places: Vec<Option<LatLon>>,
     radii: Vec<Metres>,
     jumps: Jumps,
+    /// Takeoffs that ArduPilot comes to elsewhere than at their own place, which it ignores then.
+    passed_takeoffs: HashSet<usize>,
     homes: Vec<LatLon>,
     known_homes: HashSet<[u64; 2]>,
     /// A `DO_SET_HOME` at a place that is not known was passed.
@@ -142,6 +62,7 @@ pub(super) fn follow(
         places,
         radii,
         jumps: Jumps::of(items)?,
+        passed_takeoffs: HashSet::new(),
         homes: home.into_iter().collect(),
         known_homes: home.into_iter().map(bits).collect(),
         home_lost: false,
@@ -162,18 +83,13 @@ pub(super) fn follow(
 
 impl Itinerary<'_> {
     fn walk_all(&mut self, start: State) -> Result<(), LegError> {
-        let mut taken_off: HashSet<usize> = self.walk(start)?.into_iter().collect();
+        self.walk(start)?;
         for item in 0..self.items.len() {
             let role = self.items[item].command.role();
             match (role, self.places[item]) {
+                (Role::Place(_), Some(_)) if self.passed_takeoffs.contains(&item) => {}
                 (Role::Place(destination), Some(place)) => {
-                    let takeoff = destination == Destination::Takeoff;
-                    // ArduPilot never is at a takeoff's own place once it can be elsewhere.
-                    let elsewhere = self.context.autopilot == Autopilot::ArduPilot;
-                    if takeoff && elsewhere && taken_off.contains(&item) {
-                        continue;
-                    }
-                    taken_off.extend(self.walk(self.departure(item, destination, place))?);
+                    self.walk(self.departure(item, destination, place))?;
                 }
                 (Role::Return, _) => {
                     let rally = self.context.rally.iter();
@@ -207,10 +123,8 @@ impl Itinerary<'_> {
         }
     }
 
-    /// Walks from a state to the next places along every branch. Returns the takeoffs that were
-    /// passed where the vehicle was instead of at their own place.
-    fn walk(&mut self, from: State) -> Result<Vec<usize>, LegError> {
-        let mut passed = Vec::new();
+    /// Walks from a state to the next places along every branch.
+    fn walk(&mut self, from: State) -> Result<(), LegError> {
         let mut visited = HashSet::new();
         let mut open = vec![from];
         while let Some(state) = open.pop() {
@@ -233,24 +147,28 @@ impl Itinerary<'_> {
                     open.push(next);
                     let jump = state.jump.or(Some(index));
                     let destinations = self.jumps.destinations(index);
-                    open.extend(destinations.iter().map(|&index| State { index, jump, ..state }));
+                    open.extend(destinations.iter().map(|&index| State {
+                        index,
+                        jump,
+                        jumped: true,
+                        ..state
+                    }));
                     self.count(destinations.len())?;
                 }
                 Role::PathNotGiven => {
                     return Err(LegError::PathNotGiven { item: index, command: item.command });
                 }
-                Role::Hold => open.push(State { navigation: Some(index), ..next }),
+                Role::Hold => {
+                    open.push(State { navigation: Some(index), jumped: false, ..next });
+                }
                 Role::Return => self.fly_back(state, &mut open)?,
                 Role::Place(Destination::Takeoff) => {
-                    if let Some(on) = self.take_off(state)? {
-                        passed.push(index);
-                        open.push(on);
-                    }
+                    open.extend(self.take_off(state)?);
                 }
                 Role::Place(destination) => open.extend(self.arrive(state, destination)?),
             }
         }
-        Ok(passed)
+        Ok(())
     }
 
     fn count(&mut self, steps: usize) -> Result<(), LegError> {
@@ -286,7 +204,10 @@ impl Itinerary<'_> {
         }
         let position = match (place, self.context.autopilot) {
             (None, _) => state.position,
-            (Some(place), Autopilot::ArduPilot) => state.position.or(Some(place)),
+            (Some(place), Autopilot::ArduPilot) => {
+                self.passed_takeoffs.insert(index);
+                state.position.or(Some(place))
+            }
             (Some(_), Autopilot::Px4) => return Ok(None),
             (Some(place), Autopilot::Unknown) => match state.position {
                 Some(from) if from.to_e7() != place.to_e7() => state.position,
@@ -296,6 +217,7 @@ impl Itinerary<'_> {
         Ok(Some(State {
             index: index + 1,
             navigation: Some(index),
+            jumped: false,
             position,
             altitude: self.altitude(index, Destination::Takeoff),
             circle: Metres::ZERO,
@@ -324,7 +246,7 @@ impl Itinerary<'_> {
             }
             return Ok(None);
         }
-        let on = State { index: index + 1, navigation: Some(index), ..state };
+        let on = State { index: index + 1, navigation: Some(index), jumped: false, ..state };
         match (state.status, destination) {
             (Status::Landed, _) => Ok(None),
             (Status::Before, _) => Ok(Some(on)),
@@ -349,7 +271,12 @@ impl Itinerary<'_> {
     /// At an item that returns: to home, the rally points and the landing sequences.
     fn fly_back(&mut self, state: State, open: &mut Vec<State>) -> Result<(), LegError> {
         let index = state.index;
-        if state.status != Status::Flying || state.landing.is_some() {
+        if state.status != Status::Flying {
+            let on = State { index: index + 1, navigation: Some(index), jumped: false, ..state };
+            open.push(on);
+            return Ok(());
+        }
+        if state.landing.is_some() {
             return Ok(());
         }
         let from = self.leave(&state)?;
@@ -390,9 +317,9 @@ impl Itinerary<'_> {
 
     fn insertion(&self, state: &State, end: usize) -> Option<usize> {
         let first = state.navigation.map_or(0, |item| item + 1);
-        match state.jump {
-            None => insertion_point(self.items, &self.jumps, first, end),
-            Some(_) => None,
+        match state.jumped {
+            false => insertion_point(self.items, &self.jumps, first, end),
+            true => None,
         }
     }
 
@@ -409,7 +336,7 @@ impl Itinerary<'_> {
         }
         let insert_before = match (kind, shape) {
             (LegKind::Flown | LegKind::Return(_), LegShape::Straight) => match state.landing {
-                Some(landing) => landing.insert_before.filter(|_| state.jump.is_none()),
+                Some(landing) => landing.insert_before,
                 None => self.insertion(state, state.index),
             },
             _ => None,
@@ -422,20 +349,25 @@ impl Itinerary<'_> {
         Ok(())
     }
 
-    /// Every place is judged, also one that no leg touches.
+    /// Every place is judged, also one that no leg touches, with its whole circle.
     fn stay_at_places_without_legs(&mut self) {
-        let mut touched = vec![false; self.items.len()];
-        for leg in &self.legs {
-            for item in [leg.from.item, leg.to.item].into_iter().flatten() {
-                touched[item] = true;
-            }
+        let mut touched: HashMap<[u64; 2], Metres> = HashMap::new();
+        for end in self.legs.iter().flat_map(|leg| [leg.from, leg.to]) {
+            let circle = touched.entry(bits(end.position)).or_insert(end.circle);
+            *circle = circle.max(end.circle);
         }
-        for (item, _) in touched.iter().enumerate().filter(|(_, touched)| !**touched) {
+        for (item, &place) in self.places.iter().enumerate() {
             let (Role::Place(destination), Some(position)) =
-                (self.items[item].command.role(), self.places[item])
+                (self.items[item].command.role(), place)
             else {
                 continue;
             };
+            let seen = self.passed_takeoffs.contains(&item);
+            if seen
+                || touched.get(&bits(position)).is_some_and(|&circle| circle >= self.radii[item])
+            {
+                continue;
+            }
             let altitude = self.altitude(item, destination);
             let end = LegEnd { item: Some(item), position, altitude, circle: self.radii[item] };
             self.legs.push(Leg {
@@ -461,55 +393,5 @@ impl Itinerary<'_> {
     }
 }
 
-/// The places of the items; the items whose place matters to the path must have a valid one.
-fn places(items: &[MissionItem]) -> Result<Vec<Option<LatLon>>, LegError> {
-    items.iter().enumerate().map(place).collect()
-}
-
-fn place((index, item): (usize, &MissionItem)) -> Result<Option<LatLon>, LegError> {
-    let here = item.x == 0 && item.y == 0;
-    match item.command.role() {
-        Role::SetHome if item.params[0] == 1.0 => return Ok(None),
-        Role::Place(_) | Role::SetHome => {}
-        _ => return Ok(None),
-    }
-    // Zero is "here" where it is latitude and longitude or nothing; elsewhere it is a place.
-    if here && (item.frame.is_global() || item.frame == Frame::MISSION) {
-        return Ok(None);
-    }
-    if !item.frame.is_global() {
-        return Err(LegError::Frame { item: index, frame: item.frame });
-    }
-    item.position().map(Some).map_err(|source| LegError::Position { item: index, source })
-}
-
-/// The loiter radii of the items, zero where there is none, and which had to be guessed.
-fn radii(
-    items: &[MissionItem],
-    habit: LoiterHabit,
-) -> Result<(Vec<Metres>, Vec<LegWarning>), LegError> {
-    let mut warnings = Vec::new();
-    let radius = |(index, item): (usize, &MissionItem)| {
-        if item.command.role() != Role::Place(Destination::Loiter) {
-            return Ok(Metres::ZERO);
-        }
-        let radius = loiter_radius(item, habit).unwrap_or_else(|| {
-            warnings.push(LegWarning::LoiterRadius { item: index });
-            Metres::ZERO
-        });
-        if radius.0.is_finite() { Ok(radius) } else { Err(LegError::Radius { item: index }) }
-    };
-    let radii = items.iter().enumerate().map(radius).collect::<Result<_, _>>()?;
-    Ok((radii, warnings))
-}
-
-fn warning((index, item): (usize, &MissionItem)) -> Option<LegWarning> {
-    match item.command.role() {
-        Role::Place(Destination::Unknown) => {
-            Some(LegWarning::UnknownNavigation { item: index, command: item.command })
-        }
-        Role::Unknown => Some(LegWarning::UnknownCommand { item: index, command: item.command }),
-        Role::Entry => Some(LegWarning::EnteredFromAnywhere { item: index }),
-        _ => None,
-    }
-}
+#[cfg(test)]
+mod tests;

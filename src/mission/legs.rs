@@ -1,7 +1,6 @@
 //! The legs of a mission: every stretch between two places that its items can make a vehicle fly.
 //!
-//! The types are here; [`super::itinerary`] follows the items. What is inside the rules and what is
-//! not:
+//! The types are here; `itinerary` follows the items. What is inside the rules and what is not:
 //!
 //! - A mission that begins with a takeoff begins where the vehicle stands (or at home); any other
 //!   begins at its first place, and the way there is not the mission's.
@@ -167,14 +166,15 @@ impl fmt::Display for LegName {
 }
 
 /// What a message calls an item: ground stations count home as 0 and the first command as 1.
-pub(crate) fn number(index: usize) -> usize {
+pub fn number(index: usize) -> usize {
     index + 1
 }
 
 /// The legs of a mission and what is to be said about them.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MissionLegs {
-    /// The legs by the item that they start from; those of the returns last.
+    /// The legs in the order of the items whose places they start from, those from the start
+    /// first; places that no leg touches last.
     pub legs: Vec<Leg>,
     /// What was assumed, in the order of the items.
     pub warnings: Vec<LegWarning>,

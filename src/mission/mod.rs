@@ -13,7 +13,10 @@ pub mod item;
 mod itinerary;
 mod jumps;
 pub mod legs;
+mod places;
 pub mod splice;
+#[cfg(test)]
+mod testing;
 
 pub use autopilot::Autopilot;
 pub use commands::LoiterHabit;

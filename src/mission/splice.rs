@@ -1,6 +1,6 @@
 //! Puts the waypoints of re-planned legs into a mission and leaves everything else as it was.
 //!
-//! Where they go is [`super::insertion`]'s rule and comes with each leg; how high they are is
+//! Where they go is the rule of `insertion` and comes with each leg; how high they are is
 //! [`AltitudeProfile`]'s. A waypoint inserted before a returning item makes the way home explicit
 //! up to a last straight stretch. Every other item is kept bit for bit but for its sequence number
 //! and the sequence numbers that it holds: a `DO_JUMP` goes to the same item as before, not to the
@@ -303,3 +303,6 @@ fn notes(items: &[MissionItem], before: usize) -> Vec<SpliceNote> {
         .map(|item| SpliceNote::Later { item, command: command(item) });
     conditions.chain(actions).collect()
 }
+
+#[cfg(test)]
+mod tests;

@@ -109,7 +109,8 @@ async fn a_refusal_in_the_middle_ends_with_the_old_plan_back() {
         let store = scene.store();
         scene.fake.fault("refuse-item:type=mission,item=7,code=5,times=1");
         let error = scene.replace(&store).await.unwrap_err();
-        let Obstacle::Transfer(TransferError::Refused { result, item, .. }) = &error.obstacle else {
+        let Obstacle::Transfer(TransferError::Refused { result, item, .. }) = &error.obstacle
+        else {
             panic!("{error}");
         };
         assert_eq!((*result, *item), (MissionResult(5), Some(7)));
@@ -158,7 +159,8 @@ async fn a_link_lost_in_mid_upload_is_said_and_the_next_start_puts_the_old_plan_
         let store = scene.store();
         let refused = scene.replace(&store).await.unwrap_err();
         assert!(matches!(refused.obstacle, Obstacle::Unsettled { .. }), "{refused}");
-        let settled = settle(scene.vehicle(), &store, MISSION, WhileArmed::Refuse, &mut |_| {}).await;
+        let settled =
+            settle(scene.vehicle(), &store, MISSION, WhileArmed::Refuse, &mut |_| {}).await;
         let wanted = if persona == "px4" { Settled::Untouched } else { Settled::PutBack };
         assert_eq!(settled.unwrap(), Some(wanted));
         assert_eq!(download(scene.vehicle()).await, scene.before);

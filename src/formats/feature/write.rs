@@ -52,8 +52,9 @@ pub(in crate::formats) fn features(scenario: &Scenario) -> Result<Vec<Feature>, 
     for (index, item) in scenario.rally.iter().enumerate() {
         let place = Place::RallyPoint(index + 1);
         let position = item.position().map_err(|error| WriteError::Position { place, error })?;
-        let altitude = json_number(decimal(item.z));
-        let properties = json!({ "role": "rally", "frame": item.frame.0, "altitude": altitude });
+        let FileItem { frame, params, .. } = FileItem::from_item(item);
+        let altitude = json_number(params[6]);
+        let properties = json!({ "role": "rally", "frame": frame, "altitude": altitude });
         features.push(properties, vec![Shape::Point(position)]);
     }
     Ok(features.0)

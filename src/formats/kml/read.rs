@@ -188,6 +188,8 @@ impl Placemark {
                     }
                 } else if within("Point") {
                     self.shapes.extend(line.into_iter().map(Shape::Point));
+                } else if within("LinearRing") {
+                    self.shapes.push(Shape::Polygon { outer: line, holes: Vec::new() });
                 } else {
                     self.shapes.push(Shape::Line(line));
                 }

@@ -41,6 +41,12 @@ fn every_polygon_of_a_placemark_is_an_obstacle() {
 }
 
 #[test]
+fn a_ring_of_its_own_is_an_obstacle() {
+    let ring = format!("<LinearRing><coordinates>{RING}</coordinates></LinearRing>");
+    assert_eq!(read(&format!("<Placemark>{ring}</Placemark>")).fences.regions.len(), 1);
+}
+
+#[test]
 fn extended_data_says_what_a_polygon_is() {
     let data = "<ExtendedData><Data name='fence'><value>inclusion</value></Data></ExtendedData>";
     let schema = "<ExtendedData><SchemaData><SimpleData name='fence'>inclusion</SimpleData></SchemaData>\

@@ -5,17 +5,17 @@ use std::collections::hash_map::Entry;
 
 use serde::Deserialize;
 
+use super::fence::{GeoFence, read_fence};
 use super::{OBJECT_VERSION, complex};
-use crate::fence::items::{open_ring, radius};
-use crate::fence::{FenceRegion, FenceRole, FenceSet, FenceShape};
 use crate::formats::error::{Located, Place, Problem};
 use crate::formats::item::{FileItem, float, jumps_to_indices, natural, place};
-use crate::formats::{Firmware, MAX_ITEMS, MAX_REGIONS, MAX_VERTICES, Scenario, VehicleHint};
+use crate::formats::{MAX_ITEMS, Scenario, VehicleHint};
 use crate::geodesy::LatLon;
+use crate::mission::Autopilot;
 use crate::mission::{Command, Frame, Home, Mission, MissionItem};
 
 /// `null` is NaN, as QGroundControl writes "unset".
-type Number = Option<f64>;
+pub(super) type Number = Option<f64>;
 
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
@@ -65,37 +65,6 @@ struct Transect {
 }
 
 #[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct GeoFence {
-    version: Number,
-    #[serde(default)]
-    polygons: Vec<FencePolygon>,
-    #[serde(default)]
-    circles: Vec<FenceCircle>,
-    breach_return: Option<Vec<Number>>,
-    /// Version 1: one inclusion polygon.
-    polygon: Option<Vec<Vec<f64>>>,
-}
-
-#[derive(Deserialize)]
-struct FencePolygon {
-    polygon: Vec<Vec<f64>>,
-    inclusion: bool,
-}
-
-#[derive(Deserialize)]
-struct FenceCircle {
-    circle: Circle,
-    inclusion: bool,
-}
-
-#[derive(Deserialize)]
-struct Circle {
-    center: Vec<f64>,
-    radius: f64,
-}
-
-#[derive(Deserialize)]
 struct RallyPoints {
     #[serde(default)]
     points: Vec<Vec<Number>>,
@@ -121,10 +90,10 @@ fn vehicle(mission: &PlanMission) -> VehicleHint {
     let default = VehicleHint::default();
     let speed = |value: Number, default| value.filter(|v| v.is_finite()).unwrap_or(default);
     VehicleHint {
-        firmware: match mission.firmware_type {
-            Some(3.0) => Firmware::ArduPilot,
-            Some(12.0) => Firmware::Px4,
-            _ => Firmware::Unknown,
+        autopilot: match mission.firmware_type {
+            Some(3.0) => Autopilot::ArduPilot,
+            Some(12.0) => Autopilot::Px4,
+            _ => Autopilot::Unknown,
         },
         vehicle_type: mission
             .vehicle_type
@@ -135,7 +104,7 @@ fn vehicle(mission: &PlanMission) -> VehicleHint {
     }
 }
 
-fn check_version(version: Number, what: &str) -> Result<(), Located> {
+pub(super) fn check_version(version: Number, what: &str) -> Result<(), Located> {
     match version {
         Some(number) if number != OBJECT_VERSION => Err(Problem::NotSupported {
             what: format!("{what} has version {number}, quavd reads version {OBJECT_VERSION}"),
@@ -164,19 +133,28 @@ fn read_mission(mission: PlanMission, warnings: &mut Vec<String>) -> Result<Miss
     Ok(Mission { home, items })
 }
 
-/// `[lat, lon, amsl]`; nulls, and zeros as a plan without a home has them, are no home.
-fn home(position: &[Number]) -> Result<Option<Home>, Problem> {
-    match position {
-        [None, ..] | [_, None, ..] | [Some(0.0), Some(0.0), ..] => Ok(None),
+/// Home; zeros, as a plan without a home has them, are no home.
+fn home(coordinate: &[Number]) -> Result<Option<Home>, Problem> {
+    let home = place_with_altitude("home", coordinate)?
+        .map(|(position, altitude_amsl)| Home { position, altitude_amsl });
+    Ok(home.filter(|home| (home.position.lat(), home.position.lon()) != (0.0, 0.0)))
+}
+
+/// `[lat, lon, altitude]`, and nothing where a null says so.
+pub(super) fn place_with_altitude(
+    what: &str,
+    coordinate: &[Number],
+) -> Result<Option<(LatLon, f32)>, Problem> {
+    match coordinate {
+        [None, ..] | [_, None, ..] => Ok(None),
         [Some(lat), Some(lon), rest @ ..] => {
-            let position = place("home", *lat, *lon)?;
+            let position = place(what, *lat, *lon)?;
             let altitude = rest.first().copied().flatten().unwrap_or(0.0);
-            let altitude_amsl = float(altitude, || "altitude of home".to_owned())?;
-            Ok(Some(Home { position, altitude_amsl }))
+            Ok(Some((position, float(altitude, || format!("the altitude of {what}"))?)))
         }
         _ => Err(Problem::Value {
-            what: "the position".to_owned(),
-            found: format!("{} numbers", position.len()),
+            what: what.to_owned(),
+            found: format!("{} numbers", coordinate.len()),
             expected: "[latitude, longitude, altitude]",
         }),
     }
@@ -289,98 +267,6 @@ fn simple(item: &PlanItem) -> Result<FileItem, Problem> {
         params: params.map(|param| param.unwrap_or(f64::NAN)),
         autocontinue: item.auto_continue.unwrap_or(true),
     })
-}
-
-fn read_fence(
-    name: &str,
-    fence: GeoFence,
-    warnings: &mut Vec<String>,
-) -> Result<FenceSet, Located> {
-    let GeoFence { version, mut polygons, circles, breach_return, polygon } = fence;
-    if let Some(polygon) = polygon {
-        if !polygon.is_empty() {
-            warnings.push(
-                "geoFence polygon 1: a fence of version 1, read as an inclusion area".to_owned(),
-            );
-            polygons.insert(0, FencePolygon { polygon, inclusion: true });
-        }
-    } else {
-        check_version(version, "the geoFence")?;
-    }
-    if polygons.len() + circles.len() > MAX_REGIONS {
-        return Err(Problem::TooMany { what: "fence regions", limit: MAX_REGIONS }.into());
-    }
-    if polygons.iter().map(|polygon| polygon.polygon.len()).sum::<usize>() > MAX_VERTICES {
-        return Err(Problem::TooMany { what: "fence vertices", limit: MAX_VERTICES }.into());
-    }
-    let mut fences = FenceSet::default();
-    for (index, FencePolygon { polygon, inclusion }) in polygons.iter().enumerate() {
-        let here = Place::FencePolygon(index + 1);
-        let origin = format!("{name} {here}");
-        let ring = ring(polygon).map_err(|problem| problem.at(here))?;
-        let shape = FenceShape::Polygon(ring);
-        fences.regions.push(FenceRegion { role: role(*inclusion), shape, origin });
-    }
-    for (index, FenceCircle { circle, inclusion }) in circles.iter().enumerate() {
-        let here = Place::FenceCircle(index + 1);
-        let origin = format!("{name} {here}");
-        let shape = read_circle(circle).map_err(|problem| problem.at(here))?;
-        fences.regions.push(FenceRegion { role: role(*inclusion), shape, origin });
-    }
-    if let Some(point) = breach_return {
-        fences.return_point =
-            return_point(&point).map_err(|problem| problem.at(Place::ReturnPoint))?;
-    }
-    Ok(fences)
-}
-
-fn role(inclusion: bool) -> FenceRole {
-    if inclusion { FenceRole::Inclusion } else { FenceRole::Exclusion }
-}
-
-fn ring(vertices: &[Vec<f64>]) -> Result<Vec<LatLon>, Problem> {
-    let vertex = |(index, vertex): (usize, &Vec<f64>)| {
-        let what = format!("vertex {}", index + 1);
-        match vertex[..] {
-            [lat, lon, ..] => place(&what, lat, lon),
-            _ => Err(Problem::Value {
-                what,
-                found: format!("{} numbers", vertex.len()),
-                expected: "[latitude, longitude]",
-            }),
-        }
-    };
-    let ring: Vec<_> = vertices.iter().enumerate().map(vertex).collect::<Result<_, _>>()?;
-    if ring.len() < 3 {
-        return Err(Problem::Value {
-            what: "the number of vertices".to_owned(),
-            found: ring.len().to_string(),
-            expected: "at least 3; draw the polygon again or delete it",
-        });
-    }
-    Ok(open_ring(ring))
-}
-
-fn read_circle(circle: &Circle) -> Result<FenceShape, Problem> {
-    let [lat, lon, ..] = circle.center[..] else {
-        return Err(Problem::Value {
-            what: "the centre".to_owned(),
-            found: format!("{} numbers", circle.center.len()),
-            expected: "[latitude, longitude]",
-        });
-    };
-    let centre = place("centre", lat, lon)?;
-    let radius = radius(circle.radius).map_err(|_| Problem::Value {
-        what: "the radius".to_owned(),
-        found: format!("{} m", circle.radius),
-        expected: "positive and at most 8000 km",
-    })?;
-    Ok(FenceShape::Circle { centre, radius })
-}
-
-fn return_point(point: &[Number]) -> Result<Option<(LatLon, f32)>, Problem> {
-    let Some(Home { position, altitude_amsl }) = home(point)? else { return Ok(None) };
-    Ok(Some((position, altitude_amsl)))
 }
 
 fn read_rally(points: &[Vec<Number>]) -> Result<Vec<MissionItem>, Located> {

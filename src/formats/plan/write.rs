@@ -4,10 +4,11 @@ use serde_json::{Map, Value, json};
 
 use crate::fence::items::{FenceItemProblem, radius};
 use crate::fence::{FenceRole, FenceShape};
+use crate::formats::Scenario;
 use crate::formats::error::{Place, WriteError};
 use crate::formats::item::{FileItem, decimal, json_number, jumps_from_indices};
-use crate::formats::{Firmware, Scenario};
 use crate::geodesy::LatLon;
+use crate::mission::Autopilot;
 use crate::mission::{Command, Frame, MissionItem};
 
 /// The scenario as a `.plan`: mission with planned home, geoFence, rally points. Polygons stand
@@ -30,10 +31,10 @@ pub fn write_plan(scenario: &Scenario) -> Result<String, WriteError> {
 
 fn mission(scenario: &Scenario) -> Result<Value, WriteError> {
     let vehicle = &scenario.vehicle;
-    let firmware = match vehicle.firmware {
-        Firmware::Unknown => 0,
-        Firmware::ArduPilot => 3,
-        Firmware::Px4 => 12,
+    let firmware = match vehicle.autopilot {
+        Autopilot::Unknown => 0,
+        Autopilot::ArduPilot => 3,
+        Autopilot::Px4 => 12,
     };
     let home = match scenario.mission.home {
         Some(home) => {
@@ -63,7 +64,7 @@ fn item(index: usize, item: &MissionItem) -> Value {
     object.insert("frame".to_owned(), json!(frame));
     object.insert("params".to_owned(), params.map(json_number).to_vec().into());
     object.insert("autoContinue".to_owned(), json!(autocontinue));
-    if let Some(mode) = altitude_mode(item.frame) {
+    if let Some(mode) = altitude_mode(Frame(frame)) {
         object.insert("AltitudeMode".to_owned(), json!(mode));
         object.insert("Altitude".to_owned(), json_number(params[6]));
         object.insert("AMSLAltAboveTerrain".to_owned(), Value::Null);
@@ -74,9 +75,9 @@ fn item(index: usize, item: &MissionItem) -> Value {
 /// QGroundControl's `AltitudeMode` of a frame with an altitude.
 fn altitude_mode(frame: Frame) -> Option<u8> {
     match frame {
-        Frame::GLOBAL_RELATIVE_ALT | Frame::GLOBAL_RELATIVE_ALT_INT => Some(1),
-        Frame::GLOBAL | Frame::GLOBAL_INT => Some(2),
-        Frame::GLOBAL_TERRAIN_ALT | Frame::GLOBAL_TERRAIN_ALT_INT => Some(4),
+        Frame::GLOBAL_RELATIVE_ALT => Some(1),
+        Frame::GLOBAL => Some(2),
+        Frame::GLOBAL_TERRAIN_ALT => Some(4),
         _ => None,
     }
 }
