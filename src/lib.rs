@@ -12,6 +12,7 @@
 //! - [`planner`]: one leg: candidates, QAOA rounds, finish;
 //! - [`qaoa`]: Ising problems and the engines that run the circuit;
 //! - [`replan`]: a whole mission, and the judgement of any mission;
+//! - [`report`]: what is said and shown about it: JSON, a summary, a picture;
 //! - [`cli`]: the commands of `quavd`.
 
 pub mod airspace;

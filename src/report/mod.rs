@@ -9,6 +9,7 @@
 //! Nothing here plans, judges or does I/O.
 
 pub mod json;
+pub mod picture;
 pub mod run;
 pub mod stretch;
 pub mod summary;

@@ -11,7 +11,7 @@ use crate::units::Metres;
 #[must_use]
 pub fn plan_summary(result: &Replanned, run: &Run<'_>) -> String {
     let (before, after) = (&result.before, &result.after);
-    let buffer = clearance(run.options.settings.buffer);
+    let buffer = run.options.settings.buffer;
     let legs = before.legs.len();
     let headline = if result.is_changed() {
         format!(
@@ -96,7 +96,7 @@ fn time(record: &LegRecord) -> String {
 /// The summary of a judgement.
 #[must_use]
 pub fn check_summary(verdict: &Verdict, run: &Run<'_>) -> String {
-    let buffer = clearance(run.options.settings.buffer);
+    let buffer = run.options.settings.buffer;
     let legs = verdict.legs.len();
     let too_near: Vec<_> =
         verdict.legs.iter().filter_map(|leg| Some((leg, leg.blocker.as_ref()?))).collect();
