@@ -74,7 +74,7 @@ impl ChainEngine {
         }
         let (needed, available) = (Self::memory(qubits, layers), self.memory_limit);
         if needed > available {
-            return Err(EngineError::Memory { engine, qubits, layers, needed, available });
+            return Err(EngineError::Memory { engine, qubits, needed, available });
         }
         Ok(Mixers::new(angles))
     }

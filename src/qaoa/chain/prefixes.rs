@@ -122,8 +122,8 @@ impl Group {
                     sum.im[k] += r.re * ket.im[k] + r.im * ket.re[k];
                 }
             }
-            for k in 0..2 {
-                total[k] += row.re[k] * sum.re[k] + row.im[k] * sum.im[k];
+            for (k, total) in total.iter_mut().enumerate() {
+                *total += row.re[k] * sum.re[k] + row.im[k] * sum.im[k];
             }
         }
         let [F4([a, b, c, d]), F4([e, f, g, h])] = [2.0 * total[0], 2.0 * total[1]];
