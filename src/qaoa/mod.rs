@@ -17,5 +17,12 @@ pub mod statevector;
 pub mod train;
 pub mod viterbi;
 
+pub use angles::Angles;
+pub use bits::Bits;
+pub use engine::{EngineChoice, EngineError, EngineKind};
+pub use ising::{ChainIsing, Ising, IsingError, Scale};
+pub use run::{AnglesSource, Qaoa, QaoaRun, RunSettings};
+pub use train::{Settled, TrainSettings};
+
 #[cfg(test)]
 mod vectors;

@@ -1,1 +1,9 @@
+//! Integration tests, one binary. [`sitl`] starts the fake vehicle; the other modules are one
+//! user-visible promise each.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod commands;
+mod replacing;
+mod sitl;
+mod transfers;

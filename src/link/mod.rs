@@ -1,0 +1,18 @@
+//! The line to the vehicle: opening it, framing, and being a MAVLink component on it.
+//!
+//! [`url`] is how a user writes an endpoint, [`transport`] opens it, [`frame`] is what travels,
+//! [`message`] the messages that are laid out here, [`component`] the task that owns the line.
+//! What is said over it is [`crate::vehicle`]'s.
+
+pub mod component;
+pub mod frame;
+pub mod id;
+pub mod message;
+pub mod transport;
+pub mod url;
+
+pub use component::{Identity, Inbox, Link, LinkError, LinkTask};
+pub use frame::Received;
+pub use id::{ComponentId, Node, SystemId};
+pub use transport::{OpenError, Transport};
+pub use url::{Endpoint, UrlError};

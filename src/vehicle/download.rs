@@ -1,0 +1,202 @@
+//! Downloading a plan (MAVLink mission protocol, "Download a Mission from the Vehicle").
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use tokio::time::Instant;
+
+use super::Vehicle;
+use super::discovery::Autopilot;
+use super::timing::Patience;
+use super::transfer::{
+    Awaited, BusyWait, Direction, Exchange, Heard, MOST_ITEMS, MissionResult, OnProgress, Progress,
+    Setback, TransferError,
+};
+use crate::link::message::{MissionAck, MissionRequestInt, MissionRequestList};
+use crate::mission::{MissionItem, MissionType};
+
+/// Requests that may be under way at once to an autopilot that answers in any order.
+const WIDEST_WINDOW: usize = 16;
+
+/// A plan exactly as the vehicle sent it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Downloaded {
+    /// The items in the vehicle's own numbering: `items[k].seq == k`, and for a mission of
+    /// ArduPilot item 0 is home.
+    pub items: Vec<MissionItem>,
+    /// The vehicle's fingerprint of the plan; 0 where it has none (ArduPilot).
+    pub opaque_id: u32,
+}
+
+impl Vehicle {
+    /// Downloads one plan. Items are kept as they come, whatever their values.
+    ///
+    /// # Errors
+    /// [`TransferError`].
+    pub async fn download(
+        &self,
+        mission_type: MissionType,
+        on_progress: OnProgress<'_>,
+    ) -> Result<Downloaded, TransferError> {
+        let _one_at_a_time = self.transfer.lock().await;
+        let mut restarts = 0;
+        loop {
+            let mut exchange = Exchange::new(self, mission_type)?;
+            match attempt(&mut exchange, on_progress).await {
+                Ok(plan) => {
+                    tracing::debug!(plan = %mission_type, items = plan.items.len(), "downloaded");
+                    return Ok(plan);
+                }
+                Err(Setback::Again(error))
+                    if restarts < self.timing.restarts && self.is_alive() =>
+                {
+                    restarts += 1;
+                    tracing::warn!(plan = %mission_type, %error, "download begun again");
+                }
+                Err(Setback::Again(error) | Setback::Final(error)) => return Err(error),
+            }
+        }
+    }
+}
+
+async fn attempt(
+    exchange: &mut Exchange<'_>,
+    on_progress: OnProgress<'_>,
+) -> Result<Downloaded, Setback> {
+    let (count, opaque_id) = count(exchange).await?;
+    let (direction, mission_type) = (Direction::Download, exchange.mission_type);
+    let total = usize::from(count);
+    let mut tell = |done| on_progress(Progress { direction, mission_type, done, total });
+    tell(0);
+    let items = items(exchange, count, &mut tell).await?;
+    // Without this the vehicle would keep the transfer open until its own time-out.
+    let ack = MissionAck {
+        target: exchange.target(),
+        result: MissionResult::ACCEPTED.0,
+        mission_type: exchange.wire_type(),
+        opaque_id: 0,
+    };
+    exchange.send(&ack).await?;
+    Ok(Downloaded { items, opaque_id })
+}
+
+/// MISSION_REQUEST_LIST until there is a MISSION_COUNT.
+async fn count(exchange: &mut Exchange<'_>) -> Result<(u16, u32), Setback> {
+    let request =
+        MissionRequestList { target: exchange.target(), mission_type: exchange.wire_type() };
+    let mut patience = Patience::new();
+    let mut busy = BusyWait::default();
+    loop {
+        exchange.send(&request).await?;
+        let asked = Instant::now();
+        match exchange.next_before(asked + exchange.timing().request).await? {
+            Some(Heard::Count { count, opaque_id }) => {
+                exchange.round_trip.measured(asked.elapsed());
+                if count > MOST_ITEMS {
+                    let mission_type = exchange.mission_type;
+                    return Err(TransferError::TooManyAnnounced { mission_type, count }.into());
+                }
+                return Ok((count, opaque_id));
+            }
+            Some(Heard::Ack { result: MissionResult::DENIED, .. }) => {
+                busy.pause(exchange).await?;
+                patience.renew();
+            }
+            Some(Heard::Ack { result, .. })
+                if !matches!(result, MissionResult::ACCEPTED | MissionResult::INVALID_SEQUENCE) =>
+            {
+                if let Some(error) = exchange.refusal(result, None).await? {
+                    return Err(error.into());
+                }
+            }
+            // What is left of an earlier transfer.
+            Some(Heard::Ack { .. } | Heard::Item(_) | Heard::Request(_)) => {}
+            None => {
+                if patience.is_exhausted(exchange.timing()) {
+                    return Err(exchange.no_answer(Awaited::Count, patience.waited()).into());
+                }
+            }
+        }
+    }
+}
+
+/// One request under way.
+struct Asked {
+    at: Instant,
+    again: bool,
+}
+
+/// MISSION_REQUEST_INT for each item, until all are there.
+///
+/// PX4 keeps a cursor and ends the transfer over a request out of turn, so the window is one
+/// unless the autopilot is known to answer in any order; it grows while nothing is lost.
+async fn items(
+    exchange: &mut Exchange<'_>,
+    count: u16,
+    tell: &mut (dyn FnMut(usize) + Send),
+) -> Result<Vec<MissionItem>, Setback> {
+    let widest = if exchange.vehicle.autopilot == Autopilot::ArduPilot { WIDEST_WINDOW } else { 1 };
+    let mut window = 1;
+    let mut held: BTreeMap<u16, MissionItem> = BTreeMap::new();
+    let mut asked: BTreeMap<u16, Asked> = BTreeMap::new();
+    let mut next = 0;
+    let mut patience = Patience::new();
+    while held.len() < usize::from(count) {
+        while asked.len() < window && next < count {
+            request(exchange, next).await?;
+            asked.insert(next, Asked { at: Instant::now(), again: false });
+            next += 1;
+        }
+        let wait = exchange.round_trip.item_wait(exchange.timing());
+        let oldest = asked.values().map(|asked| asked.at).min().unwrap_or_else(Instant::now);
+        match exchange.next_before(oldest + wait).await? {
+            Some(Heard::Item(item)) => {
+                // Another seq than one that is wanted: a repeat, or somebody's mistake.
+                let Some(request) = asked.remove(&item.seq) else { continue };
+                if !request.again {
+                    exchange.round_trip.measured(request.at.elapsed());
+                    window = (window + 1).min(widest);
+                }
+                held.insert(item.seq, item);
+                patience.renew();
+                tell(held.len());
+            }
+            Some(Heard::Ack { result, .. }) if result != MissionResult::ACCEPTED => {
+                // PX4 lost the thread, or the plan is shorter than was announced.
+                if let Some(error) = exchange.refusal(result, None).await? {
+                    return Err(Setback::Again(error));
+                }
+            }
+            Some(_) => {}
+            None => {
+                window = (window / 2).max(1);
+                let waiting = asked.keys().next().copied().unwrap_or(next);
+                if patience.is_exhausted(exchange.timing()) {
+                    let error = exchange.no_answer(Awaited::Item(waiting), patience.waited());
+                    return Err(Setback::Again(error));
+                }
+                ask_overdue(exchange, &mut asked, wait).await?;
+            }
+        }
+    }
+    Ok(held.into_values().collect())
+}
+
+async fn ask_overdue(
+    exchange: &Exchange<'_>,
+    asked: &mut BTreeMap<u16, Asked>,
+    wait: Duration,
+) -> Result<(), TransferError> {
+    for (&seq, request_made) in asked.iter_mut() {
+        if request_made.at.elapsed() >= wait {
+            request(exchange, seq).await?;
+            *request_made = Asked { at: Instant::now(), again: true };
+        }
+    }
+    Ok(())
+}
+
+async fn request(exchange: &Exchange<'_>, seq: u16) -> Result<(), TransferError> {
+    let (target, mission_type) = (exchange.target(), exchange.wire_type());
+    exchange.send(&MissionRequestInt { seq, target, mission_type }).await
+}

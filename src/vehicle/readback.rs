@@ -1,0 +1,457 @@
+//! Does the vehicle hold what it was sent? Field by field, and nothing is excused but what the
+//! autopilots are known to do to an item on its way through their storage.
+
+use std::fmt;
+
+use super::discovery::Autopilot;
+use crate::mission::{Command, Frame, MissionItem, MissionType};
+
+/// One field that is not as it was sent.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Difference {
+    /// The item, in the vehicle's numbering.
+    pub seq: usize,
+    /// Which of its fields.
+    pub field: Field,
+    /// What was sent.
+    pub sent: String,
+    /// What the vehicle holds.
+    pub held: String,
+}
+
+/// A part of a plan that can differ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Field {
+    /// The number of items.
+    Count,
+    /// `seq`.
+    Seq,
+    /// `command`.
+    Command,
+    /// `frame`.
+    Frame,
+    /// `param1` (0) to `param4` (3).
+    Param(usize),
+    /// `x`, latitude times 1e7.
+    X,
+    /// `y`, longitude times 1e7.
+    Y,
+    /// `z`, altitude in metres.
+    Z,
+    /// `autocontinue`.
+    Autocontinue,
+}
+
+impl fmt::Display for Field {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Count => f.write_str("count"),
+            Self::Seq => f.write_str("seq"),
+            Self::Command => f.write_str("command"),
+            Self::Frame => f.write_str("frame"),
+            Self::Param(k) => write!(f, "param{}", k + 1),
+            Self::X => f.write_str("x"),
+            Self::Y => f.write_str("y"),
+            Self::Z => f.write_str("z"),
+            Self::Autocontinue => f.write_str("autocontinue"),
+        }
+    }
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.field {
+            Field::Count => write!(f, "{} items sent, {} held", self.sent, self.held),
+            field => {
+                write!(f, "item {} {field}: {} sent, {} held", self.seq, self.sent, self.held)
+            }
+        }
+    }
+}
+
+/// All differences between what was sent and what the vehicle holds, in the order of the items.
+/// None: the vehicle holds it.
+///
+/// Excused, per autopilot (as read in their sources and seen in ArduCopter 4.7):
+/// - both: `current`, which is the vehicle's state and not the plan's content; a frame and its
+///   `_INT` twin, which mean the same in a MISSION_ITEM_INT;
+/// - ArduPilot: home in slot 0 of a mission; altitudes to the centimetre, those of rally points to
+///   the metre; `autocontinue`; the frame, position and altitude of commands that have no place; in
+///   navigation commands the parameters that it drops or packs ([`ardupilot_keeps`]); in a fence
+///   everything but command, position and `param1`;
+/// - PX4: yaw, kept in radians; in a fence all that a fence item has no use for.
+#[must_use]
+pub fn differences(
+    autopilot: Autopilot,
+    mission_type: MissionType,
+    sent: &[MissionItem],
+    held: &[MissionItem],
+) -> Vec<Difference> {
+    let mut found = Vec::new();
+    let has_home_slot = autopilot == Autopilot::ArduPilot && mission_type == MissionType::Mission;
+    if has_home_slot && sent.len() <= 1 && held.len() <= 1 {
+        // No commands, whether home is counted or not.
+        return found;
+    }
+    if sent.len() != held.len() {
+        found.push(Difference {
+            seq: sent.len().min(held.len()),
+            field: Field::Count,
+            sent: sent.len().to_string(),
+            held: held.len().to_string(),
+        });
+    }
+    for (seq, (sent, held)) in sent.iter().zip(held).enumerate() {
+        if !(has_home_slot && seq == 0) {
+            compare(autopilot, mission_type, seq, sent, held, &mut found);
+        }
+    }
+    found
+}
+
+fn compare(
+    autopilot: Autopilot,
+    mission_type: MissionType,
+    seq: usize,
+    sent: &MissionItem,
+    held: &MissionItem,
+    found: &mut Vec<Difference>,
+) {
+    let rules = Rules { autopilot, mission_type, command: sent.command };
+    let mut check = |same: bool, field: Field, sent: &dyn fmt::Display, held: &dyn fmt::Display| {
+        if !same {
+            found.push(Difference { seq, field, sent: sent.to_string(), held: held.to_string() });
+        }
+    };
+    check(usize::from(held.seq) == seq, Field::Seq, &seq, &held.seq);
+    check(sent.command == held.command, Field::Command, &sent.command.0, &held.command.0);
+    check(rules.same_frame(sent.frame, held.frame), Field::Frame, &sent.frame.0, &held.frame.0);
+    for k in 0..4 {
+        let (sent, held) = (sent.params[k], held.params[k]);
+        check(rules.same_param(k, sent, held), Field::Param(k), &sent, &held);
+    }
+    check(rules.same_place(sent.x, held.x), Field::X, &sent.x, &held.x);
+    check(rules.same_place(sent.y, held.y), Field::Y, &sent.y, &held.y);
+    check(rules.same_altitude(sent.z, held.z), Field::Z, &sent.z, &held.z);
+    check(
+        rules.same_autocontinue(sent.autocontinue, held.autocontinue),
+        Field::Autocontinue,
+        &sent.autocontinue,
+        &held.autocontinue,
+    );
+}
+
+/// What counts as the same, for one item.
+struct Rules {
+    autopilot: Autopilot,
+    mission_type: MissionType,
+    command: Command,
+}
+
+impl Rules {
+    fn is_ardupilot(&self) -> bool {
+        self.autopilot == Autopilot::ArduPilot
+    }
+
+    /// ArduPilot keeps no frame, position or altitude with a mission command that has no place.
+    fn has_no_place(&self) -> bool {
+        self.is_ardupilot()
+            && self.mission_type == MissionType::Mission
+            && !ARDUPILOT_WITH_PLACE.contains(&self.command.0)
+    }
+
+    fn same_frame(&self, sent: Frame, held: Frame) -> bool {
+        let either_global = sent.is_global() && held.is_global();
+        plain(sent) == plain(held)
+            || self.has_no_place()
+            || (self.mission_type == MissionType::Fence && either_global)
+            // ArduPilot reads frame 2 with a place as altitude above mean sea level.
+            || (self.is_ardupilot() && sent == Frame::MISSION && plain(held) == Frame::GLOBAL)
+    }
+
+    fn same_place(&self, sent: i32, held: i32) -> bool {
+        sent == held || (self.has_no_place() && held == 0)
+    }
+
+    fn same_altitude(&self, sent: f32, held: f32) -> bool {
+        if same_bits_or_value(sent, held) || (self.has_no_place() && held == 0.0) {
+            return true;
+        }
+        match self.mission_type {
+            MissionType::Fence => held == 0.0,
+            // Cut to whole centimetres, or metres, towards zero; the rest is f32's own rounding.
+            MissionType::Mission => self.is_ardupilot() && cut_to(0.01, sent, held),
+            MissionType::Rally => self.is_ardupilot() && cut_to(1.0, sent, held),
+        }
+    }
+
+    fn same_autocontinue(&self, sent: u8, held: u8) -> bool {
+        sent == held || self.is_ardupilot() || self.mission_type == MissionType::Fence
+    }
+
+    fn same_param(&self, k: usize, sent: f32, held: f32) -> bool {
+        if same_bits_or_value(sent, held) {
+            return true;
+        }
+        match (self.mission_type, self.autopilot) {
+            (MissionType::Fence, _) => k > 0 && held == 0.0,
+            (MissionType::Rally, _) => held == 0.0,
+            (MissionType::Mission, Autopilot::ArduPilot) => {
+                let keeps = ardupilot_keeps(self.command);
+                keeps.is_some_and(|keeps| keeps[k].allows(sent, held))
+            }
+            (MissionType::Mission, Autopilot::Px4) => {
+                k == 3 && PX4_WITH_YAW.contains(&self.command) && same_angle(sent, held)
+            }
+            (MissionType::Mission, Autopilot::Other(_)) => false,
+        }
+    }
+}
+
+/// Equal as numbers (so 0 and -0 are one), or the same NaN or infinity.
+fn same_bits_or_value(a: f32, b: f32) -> bool {
+    a == b || (a.is_nan() && b.is_nan())
+}
+
+fn plain(frame: Frame) -> Frame {
+    match frame {
+        Frame::GLOBAL_INT => Frame::GLOBAL,
+        Frame::GLOBAL_RELATIVE_ALT_INT => Frame::GLOBAL_RELATIVE_ALT,
+        Frame::GLOBAL_TERRAIN_ALT_INT => Frame::GLOBAL_TERRAIN_ALT,
+        other => other,
+    }
+}
+
+/// Whether `held` is `sent` cut to whole `unit`s.
+fn cut_to(unit: f32, sent: f32, held: f32) -> bool {
+    let rounding = 4.0 * f32::EPSILON * sent.abs().max(1.0);
+    (sent - held).abs() <= unit + rounding
+}
+
+fn same_angle(sent: f32, held: f32) -> bool {
+    let apart = (sent - held).rem_euclid(360.0);
+    apart.min(360.0 - apart) < 1e-3
+}
+
+/// Commands with which PX4 keeps `param4` as a yaw, in radians.
+const PX4_WITH_YAW: [Command; 6] = [
+    Command::NAV_WAYPOINT,
+    Command::NAV_LOITER_UNLIM,
+    Command::NAV_LAND,
+    Command::NAV_TAKEOFF,
+    Command::NAV_VTOL_TAKEOFF,
+    Command::NAV_VTOL_LAND,
+];
+
+/// Commands with which ArduPilot keeps a location (`AP_Mission::stored_in_location`, and those
+/// that keep x and y in another form).
+const ARDUPILOT_WITH_PLACE: [u16; 20] =
+    [16, 17, 18, 19, 21, 22, 30, 31, 82, 84, 85, 94, 179, 188, 189, 191, 195, 201, 42_702, 43_003];
+
+/// What ArduPilot's storage makes of a parameter, where it does not keep it.
+#[derive(Clone, Copy)]
+enum Keeps {
+    /// Dropped by Copter; Plane keeps a whole number up to 255.
+    Nothing,
+    /// Cut to a whole number.
+    Whole,
+    /// A radius in eight bits: whole metres up to 255, then tens of metres; the sign is kept.
+    Radius,
+    /// Only its sign: 1 or -1.
+    Sign,
+    /// Only whether it is positive: 1 or 0.
+    Positive,
+}
+
+impl Keeps {
+    fn allows(self, sent: f32, held: f32) -> bool {
+        let whole = if sent.is_finite() { sent.trunc() } else { 0.0 };
+        match self {
+            Self::Nothing => held == 0.0 || held == whole.clamp(0.0, 255.0),
+            Self::Whole => held == whole,
+            Self::Radius => {
+                let tens = (whole.abs() / 10.0).floor().min(255.0) * 10.0;
+                held == whole || held == tens.copysign(sent)
+            }
+            Self::Sign => held == if sent < 0.0 { -1.0 } else { 1.0 },
+            Self::Positive => held == if sent > 0.0 { 1.0 } else { 0.0 },
+        }
+    }
+}
+
+/// How ArduPilot packs `param1` to `param4` of navigation commands. `None`: bit by bit.
+///
+/// quavd sends back what it downloaded and adds plain waypoints, so these few are all that a
+/// correct read-back can show.
+fn ardupilot_keeps(command: Command) -> Option<[Keeps; 4]> {
+    use Keeps::{Nothing, Positive, Radius, Sign, Whole};
+    Some(match command {
+        Command::NAV_WAYPOINT | Command::NAV_SPLINE_WAYPOINT => [Whole, Nothing, Nothing, Nothing],
+        Command::NAV_LOITER_UNLIM => [Nothing, Nothing, Whole, Nothing],
+        Command::NAV_LOITER_TURNS => [Whole, Nothing, Radius, Positive],
+        Command::NAV_LOITER_TIME => [Whole, Nothing, Sign, Positive],
+        Command::NAV_RETURN_TO_LAUNCH => [Nothing; 4],
+        Command::NAV_LAND => [Whole, Nothing, Nothing, Sign],
+        Command::NAV_TAKEOFF => [Whole, Nothing, Nothing, Nothing],
+        Command::NAV_LOITER_TO_ALT => [Nothing, Whole, Nothing, Positive],
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn waypoint() -> MissionItem {
+        MissionItem {
+            seq: 0,
+            frame: Frame::GLOBAL_RELATIVE_ALT_INT,
+            command: Command::NAV_WAYPOINT,
+            current: 0,
+            autocontinue: 1,
+            params: [0.0; 4],
+            x: 473_977_420,
+            y: 85_455_940,
+            z: 50.0,
+        }
+    }
+
+    fn plan(items: impl IntoIterator<Item = MissionItem>) -> Vec<MissionItem> {
+        items.into_iter().zip(0..).map(|(item, seq)| MissionItem { seq, ..item }).collect()
+    }
+
+    fn fields(autopilot: Autopilot, sent: &[MissionItem], held: &[MissionItem]) -> Vec<Field> {
+        let found = differences(autopilot, MissionType::Mission, sent, held);
+        found.iter().map(|difference| difference.field).collect()
+    }
+
+    #[test]
+    fn every_field_that_changed_is_named() {
+        let sent = plan([waypoint(), waypoint()]);
+        let mut held = sent.clone();
+        held[1] = MissionItem {
+            seq: 1,
+            frame: Frame::GLOBAL_INT,
+            command: Command::NAV_LAND,
+            current: 1,
+            autocontinue: 0,
+            params: [1.0, 2.0, 3.0, f32::NAN],
+            x: 1,
+            y: 2,
+            z: 3.0,
+        };
+        let head = [Field::Command, Field::Frame];
+        let params = (0..4).map(Field::Param);
+        let tail = [Field::X, Field::Y, Field::Z, Field::Autocontinue];
+        let all: Vec<_> = head.into_iter().chain(params).chain(tail).collect();
+        assert_eq!(fields(Autopilot::Px4, &sent, &held), all);
+        let found = differences(Autopilot::Px4, MissionType::Mission, &sent, &held);
+        assert_eq!(found[6].to_string(), "item 1 x: 473977420 sent, 1 held");
+    }
+
+    #[test]
+    fn one_unit_of_position_is_a_difference_on_either_autopilot() {
+        for autopilot in [Autopilot::ArduPilot, Autopilot::Px4] {
+            let sent = plan([waypoint(), waypoint()]);
+            let mut held = sent.clone();
+            held[1].x += 1;
+            assert_eq!(fields(autopilot, &sent, &held), [Field::X]);
+        }
+    }
+
+    #[test]
+    fn a_missing_or_added_item_is_a_difference() {
+        let sent = plan([waypoint(), waypoint()]);
+        let found = differences(Autopilot::Px4, MissionType::Mission, &sent, &sent[..1]);
+        assert_eq!(found[0].to_string(), "2 items sent, 1 held");
+        assert_eq!(fields(Autopilot::Px4, &sent[..1], &sent), [Field::Count]);
+    }
+
+    #[test]
+    fn what_ardupilot_is_known_to_do_is_excused() {
+        let land = MissionItem { command: Command::NAV_LAND, ..waypoint() };
+        let speed = MissionItem {
+            command: Command(178),
+            frame: Frame::MISSION,
+            params: [1.0, 5.0, -1.0, 0.0],
+            x: 0,
+            y: 0,
+            z: 0.0,
+            ..waypoint()
+        };
+        let mut long = waypoint();
+        long.params = [1.7, 3.0, 0.0, f32::NAN];
+        long.z = 30.123;
+        let sent = plan([waypoint(), long, land, speed]);
+        let mut held = sent.clone();
+        held[0].x = -353_632_621;
+        held[0].frame = Frame::GLOBAL;
+        held[1].params = [1.0, 0.0, 0.0, 0.0];
+        held[1].z = 30.12;
+        held[1].frame = Frame::GLOBAL_RELATIVE_ALT;
+        held[2].params[3] = 1.0;
+        held[2].frame = Frame::GLOBAL_RELATIVE_ALT;
+        held[3].frame = Frame::GLOBAL;
+        assert_eq!(fields(Autopilot::ArduPilot, &sent, &held), []);
+        assert!(!fields(Autopilot::Px4, &sent, &held).is_empty());
+    }
+
+    #[test]
+    fn what_ardupilot_is_not_known_to_do_is_not_excused() {
+        let mut item = waypoint();
+        item.params[0] = 3.0;
+        let speed =
+            MissionItem { command: Command(178), params: [1.0, 5.0, -1.0, 0.0], ..waypoint() };
+        let sent = plan([waypoint(), item, speed]);
+        for (spoil, field) in [
+            (
+                (|items: &mut Vec<MissionItem>| items[1].params[0] = 4.0) as fn(&mut Vec<_>),
+                Field::Param(0),
+            ),
+            (|items| items[1].z += 0.02, Field::Z),
+            (|items| items[1].frame = Frame::GLOBAL, Field::Frame),
+            (|items| items[2].params[1] = 6.0, Field::Param(1)),
+            (|items| items[2].seq = 7, Field::Seq),
+        ] {
+            let mut held = sent.clone();
+            spoil(&mut held);
+            assert_eq!(fields(Autopilot::ArduPilot, &sent, &held), [field]);
+        }
+    }
+
+    #[test]
+    fn px4_may_turn_a_yaw_by_a_whole_circle_only() {
+        let mut item = waypoint();
+        item.params[3] = -90.0;
+        let sent = plan([item]);
+        let mut held = sent.clone();
+        held[0].params[3] = 270.000_03;
+        assert_eq!(fields(Autopilot::Px4, &sent, &held), []);
+        held[0].params[3] = 90.0;
+        assert_eq!(fields(Autopilot::Px4, &sent, &held), [Field::Param(3)]);
+    }
+
+    #[test]
+    fn a_fence_is_its_commands_positions_and_counts() {
+        let vertex = MissionItem {
+            command: Command::NAV_FENCE_POLYGON_VERTEX_EXCLUSION,
+            params: [3.0, 0.0, 0.0, 0.0],
+            ..waypoint()
+        };
+        let sent = plan([vertex, vertex, vertex]);
+        let mut held = sent.clone();
+        for item in &mut held {
+            item.frame = Frame::GLOBAL;
+            item.z = 0.0;
+            item.autocontinue = 0;
+        }
+        let fence = |sent: &[_], held: &[_]| {
+            differences(Autopilot::ArduPilot, MissionType::Fence, sent, held).len()
+        };
+        assert_eq!(fence(&sent, &held), 0);
+        held[2].params[0] = 4.0;
+        assert_eq!(fence(&sent, &held), 1);
+        held[0].x -= 1;
+        assert_eq!(fence(&sent, &held), 2, "slot 0 of a fence is no home");
+    }
+}

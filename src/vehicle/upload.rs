@@ -1,0 +1,219 @@
+//! Uploading a plan (MAVLink mission protocol, "Upload a Mission to the Vehicle").
+//!
+//! An acknowledged upload is not yet a proven one: the caller downloads and compares. That is
+//! also what settles an upload whose last acknowledgement was lost.
+
+use tokio::time::Instant;
+
+use super::Vehicle;
+use super::discovery::Autopilot;
+use super::timing::Patience;
+use super::transfer::{
+    Awaited, BusyWait, Direction, Exchange, Heard, MOST_ITEMS, MissionResult, OnProgress, Progress,
+    Setback, TransferError,
+};
+use crate::link::message::{MissionCount, MissionItemInt};
+use crate::mission::{MissionItem, MissionType};
+
+/// How an upload ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Uploaded {
+    /// The vehicle accepted it.
+    Acknowledged,
+    /// All items went out, but whether the vehicle took them is not known.
+    Unconfirmed,
+}
+
+impl Vehicle {
+    /// Uploads one plan, in the vehicle's own numbering. An empty list clears the plan.
+    ///
+    /// Items are numbered by their place in the list. This replaces what the vehicle holds, and
+    /// ArduPilot does so item by item: save the old plan first.
+    ///
+    /// # Errors
+    /// [`TransferError`]. The vehicle may then hold the old plan, a part of the new one, or both.
+    pub async fn upload(
+        &self,
+        mission_type: MissionType,
+        items: &[MissionItem],
+        on_progress: OnProgress<'_>,
+    ) -> Result<Uploaded, TransferError> {
+        let count = u16::try_from(items.len()).ok().filter(|&count| count <= MOST_ITEMS);
+        let count =
+            count.ok_or(TransferError::TooManyToSend { mission_type, count: items.len() })?;
+        let _one_at_a_time = self.transfer.lock().await;
+        let mut restarts = 0;
+        loop {
+            let mut exchange = Exchange::new(self, mission_type)?;
+            let mut upload =
+                Upload { exchange: &mut exchange, items, count, last_sent: None, tries: 0 };
+            match upload.attempt(on_progress).await {
+                Ok(uploaded) => {
+                    tracing::debug!(plan = %mission_type, items = count, ?uploaded, "uploaded");
+                    return Ok(uploaded);
+                }
+                Err(Setback::Again(error))
+                    if restarts < self.timing.restarts && self.is_alive() =>
+                {
+                    restarts += 1;
+                    tracing::warn!(plan = %mission_type, %error, "upload begun again");
+                }
+                Err(Setback::Again(error) | Setback::Final(error)) => return Err(error),
+            }
+        }
+    }
+}
+
+/// One attempt: offers the count, then hands out what is asked for.
+struct Upload<'a, 'v> {
+    exchange: &'a mut Exchange<'v>,
+    items: &'a [MissionItem],
+    count: u16,
+    /// The furthest item that the vehicle asked for and was sent.
+    last_sent: Option<u16>,
+    /// How often that one was sent.
+    tries: u32,
+}
+
+impl Upload<'_, '_> {
+    async fn attempt(&mut self, on_progress: OnProgress<'_>) -> Result<Uploaded, Setback> {
+        let timing = self.exchange.timing();
+        let (direction, mission_type) = (Direction::Upload, self.exchange.mission_type);
+        let total = usize::from(self.count);
+        let mut tell = |done| on_progress(Progress { direction, mission_type, done, total });
+        tell(0);
+        self.offer().await?;
+        let mut sent_at = Instant::now();
+        let mut deadline = sent_at + timing.request;
+        let mut patience = Patience::new();
+        let mut busy = BusyWait::default();
+        loop {
+            match self.exchange.next_before(deadline).await? {
+                Some(Heard::Request(seq)) if seq < self.count => {
+                    if self.last_sent.is_none_or(|last| seq > last) {
+                        if self.tries <= 1 {
+                            self.exchange.round_trip.measured(sent_at.elapsed());
+                        }
+                        patience.renew();
+                        tell(usize::from(seq));
+                    }
+                    self.send_item(seq).await?;
+                    sent_at = Instant::now();
+                }
+                Some(Heard::Ack { result, .. }) => {
+                    if let Some(uploaded) = self.acknowledged(result, &mut busy).await? {
+                        tell(total);
+                        return Ok(uploaded);
+                    }
+                    if self.last_sent.is_some() {
+                        continue; // noise: the running wait goes on
+                    }
+                    sent_at = Instant::now();
+                }
+                Some(Heard::Request(_) | Heard::Count { .. } | Heard::Item(_)) => continue,
+                None => {
+                    if patience.is_exhausted(timing) {
+                        return self.silence(&patience);
+                    }
+                    self.repeat().await?;
+                    sent_at = Instant::now();
+                }
+            }
+            let wait = match self.last_sent {
+                None => timing.request,
+                Some(_) => self.exchange.round_trip.item_wait(timing),
+            };
+            deadline = sent_at + wait;
+        }
+    }
+
+    fn all_sent(&self) -> bool {
+        self.last_sent.map_or(0, |last| last + 1) == self.count
+    }
+
+    async fn offer(&self) -> Result<(), TransferError> {
+        let message = MissionCount {
+            count: self.count,
+            target: self.exchange.target(),
+            mission_type: self.exchange.wire_type(),
+            opaque_id: 0,
+        };
+        self.exchange.send(&message).await
+    }
+
+    async fn send_item(&mut self, seq: u16) -> Result<(), TransferError> {
+        let Some(&item) = self.items.get(usize::from(seq)) else { return Ok(()) };
+        let message = MissionItemInt {
+            item: MissionItem { seq, ..item },
+            target: self.exchange.target(),
+            mission_type: self.exchange.wire_type(),
+        };
+        self.exchange.send(&message).await?;
+        if self.last_sent.is_none_or(|last| seq > last) {
+            self.last_sent = Some(seq);
+            self.tries = 1;
+        } else {
+            self.tries += 1;
+        }
+        Ok(())
+    }
+
+    /// Nothing came: either our message or the answer was lost. Sends again what was sent last,
+    /// never what was not asked for.
+    async fn repeat(&mut self) -> Result<(), TransferError> {
+        match self.last_sent {
+            None => self.offer().await,
+            Some(seq) => self.send_item(seq).await,
+        }
+    }
+
+    /// What an acknowledgement means at this point. `None`: go on.
+    async fn acknowledged(
+        &mut self,
+        result: MissionResult,
+        busy: &mut BusyWait,
+    ) -> Result<Option<Uploaded>, Setback> {
+        match result {
+            MissionResult::ACCEPTED if self.all_sent() => Ok(Some(Uploaded::Acknowledged)),
+            // Of an earlier transfer; or ArduPilot's word for an item that it has already. It
+            // carries on after saying so.
+            MissionResult::ACCEPTED | MissionResult::INVALID_SEQUENCE => Ok(None),
+            result if self.last_sent.is_none() && self.means_busy(result) => {
+                busy.pause(self.exchange).await?;
+                self.offer().await?;
+                Ok(None)
+            }
+            result => {
+                let Some(error) = self.exchange.refusal(result, self.last_sent).await? else {
+                    return Ok(self.all_sent().then_some(Uploaded::Acknowledged));
+                };
+                if result == MissionResult::OPERATION_CANCELLED {
+                    return Err(Setback::Again(error));
+                }
+                if result == MissionResult::ERROR && self.all_sent() && self.tries > 1 {
+                    // Perhaps it only says that it no longer waits for the repeated last item.
+                    return Ok(Some(Uploaded::Unconfirmed));
+                }
+                Err(Setback::Final(error))
+            }
+        }
+    }
+
+    /// Whether a refusal of the count only says "not now". PX4 has no better word than ERROR.
+    fn means_busy(&self, result: MissionResult) -> bool {
+        let px4 = self.exchange.vehicle.autopilot == Autopilot::Px4;
+        result == MissionResult::DENIED || (px4 && result == MissionResult::ERROR)
+    }
+
+    fn silence(&self, patience: &Patience) -> Result<Uploaded, Setback> {
+        let awaited = match self.last_sent {
+            None => Awaited::Request(0),
+            Some(_) if self.all_sent() => {
+                // The end may have been reached; a vehicle that is gone shows in the read-back.
+                return Ok(Uploaded::Unconfirmed);
+            }
+            Some(last) => Awaited::Request(last + 1),
+        };
+        Err(Setback::Again(self.exchange.no_answer(awaited, patience.waited())))
+    }
+}
