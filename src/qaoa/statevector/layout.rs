@@ -38,11 +38,6 @@ impl Layout {
         1 << self.high
     }
 
-    /// Number of tiles.
-    pub(super) fn tiles(&self) -> usize {
-        self.row / self.width
-    }
-
     /// Vectors of a tile.
     pub(super) fn tile(&self) -> usize {
         self.width << self.high
