@@ -13,6 +13,7 @@ pub mod engine;
 pub mod ising;
 pub mod run;
 mod simd;
+pub mod statevector;
 pub mod train;
 pub mod viterbi;
 

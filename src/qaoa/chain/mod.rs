@@ -5,12 +5,14 @@
 //! needs. `folded` stores such vectors and takes them over a bond, `site` has the weights of one qubit,
 //! `sweep` steps from site to site, and `gradient` makes ⟨H⟩ and all derivatives out of a sweep from
 //! each end. For bitstrings the ket's 2^p amplitudes are enough: `circuit` has them for one qubit,
-//! `norms` what lies to the right, and `sampling` draws from both.
+//! `norms` what lies to the right, `prefixes` carries them
+//! from qubit to qubit, and `sampling` draws from all that.
 
 mod circuit;
 mod folded;
 mod gradient;
 mod norms;
+mod prefixes;
 mod sampling;
 mod site;
 mod sweep;
@@ -25,6 +27,7 @@ use super::simd;
 use circuit::Circuit;
 use gradient::{Expectation, Gradient};
 use norms::Norms;
+use sampling::{Draw, Probability};
 use site::{MIN_LAYERS, Mixers};
 use sweep::{SIDE_SLABS, SPECTRUM_SLABS, Workspace};
 
@@ -71,7 +74,7 @@ impl ChainEngine {
         }
         let (needed, available) = (Self::memory(qubits, layers), self.memory_limit);
         if needed > available {
-            return Err(EngineError::Memory { engine, qubits, layers, needed, available });
+            return Err(EngineError::Memory { engine, qubits, needed, available });
         }
         Ok(Mixers::new(angles))
     }
@@ -113,7 +116,7 @@ impl Engine for ChainEngine {
         let Self { chain, workspace, .. } = self;
         let norms = simd::run(Norms { chain, mixers, workspace });
         let circuit = Circuit::new(mixers);
-        Ok(sampling::sample(&circuit, &self.chain, &norms, shots, rng))
+        Ok(simd::run(Draw { circuit: &circuit, chain, right_norms: &norms, shots, rng }))
     }
 
     fn probability(&mut self, angles: &Angles, bits: &Bits) -> Result<f64, EngineError> {
@@ -121,6 +124,7 @@ impl Engine for ChainEngine {
         if found != expected {
             return Err(EngineError::BitsLength { found, expected });
         }
-        Ok(sampling::probability(&Circuit::new(&self.mixers(angles)?), &self.chain, bits))
+        let circuit = Circuit::new(&self.mixers(angles)?);
+        Ok(simd::run(Probability { circuit: &circuit, chain: &self.chain, bits }))
     }
 }
