@@ -1,7 +1,14 @@
 //! Fences: the areas a vehicle may or may not fly in, whatever they were read from.
 //!
 //! A [`FenceSet`] is still geographic and unbuffered. Turning it into something a path can be
-//! tested against is [`crate::airspace`]'s work.
+//! tested against is [`crate::airspace`]'s work. [`items`] reads and writes the fence plan items that
+//! vehicles and files hold.
+
+pub mod items;
+#[cfg(test)]
+pub(crate) mod samples;
+
+pub use items::{DecodedFence, FenceItemError, decode_fence, encode_fence};
 
 use crate::geodesy::LatLon;
 use crate::units::Metres;

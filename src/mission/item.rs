@@ -41,16 +41,20 @@ impl Command {
     pub const NAV_LAND: Self = Self(21);
     pub const NAV_TAKEOFF: Self = Self(22);
     pub const NAV_LOITER_TO_ALT: Self = Self(31);
+    pub const NAV_ROI: Self = Self(80);
     pub const NAV_SPLINE_WAYPOINT: Self = Self(82);
     pub const NAV_VTOL_TAKEOFF: Self = Self(84);
     pub const NAV_VTOL_LAND: Self = Self(85);
     pub const NAV_DELAY: Self = Self(93);
     /// The last of the navigation commands (`MAV_CMD_NAV_LAST`).
     pub const NAV_LAST: Self = Self(95);
+    pub const CONDITION_DELAY: Self = Self(112);
+    pub const CONDITION_DISTANCE: Self = Self(114);
     pub const DO_JUMP: Self = Self(177);
     pub const DO_SET_HOME: Self = Self(179);
     pub const DO_RETURN_PATH_START: Self = Self(188);
     pub const DO_LAND_START: Self = Self(189);
+    pub const DO_SET_ROI: Self = Self(201);
     pub const JUMP_TAG: Self = Self(600);
     pub const DO_JUMP_TAG: Self = Self(601);
     pub const NAV_FENCE_RETURN_POINT: Self = Self(5000);

@@ -1,10 +1,28 @@
 //! Missions as MAVLink's mission protocol knows them: items, commands, frames.
 //!
-//! [`item`] is the raw item, exactly what travels on the wire. Nothing here does I/O.
+//! [`item`] is the raw item, exactly what travels on the wire; [`commands`] says what its command
+//! means for the path. [`legs()`] makes stretches between places of the items, [`splice()`] puts
+//! waypoints into the items so that nothing else changes. Nothing here does I/O.
 
+pub mod altitude;
+pub mod autopilot;
+pub mod commands;
+mod curve;
+mod insertion;
 pub mod item;
+mod itinerary;
+mod jumps;
+pub mod legs;
+mod places;
+pub mod splice;
+#[cfg(test)]
+mod testing;
 
+pub use autopilot::Autopilot;
+pub use commands::LoiterHabit;
 pub use item::{Command, Frame, MissionItem, MissionType};
+pub use legs::{FlightContext, Leg, LegError, MissionLegs, legs};
+pub use splice::{Detour, SpliceError, Spliced, splice};
 
 use crate::geodesy::LatLon;
 

@@ -14,6 +14,7 @@ use super::state::{VehicleState, command, follow};
 use super::timing::Timing;
 use crate::link::message::Heartbeat;
 use crate::link::{ComponentId, Inbox, Link, LinkError, Node, Received, SystemId};
+use crate::mission;
 
 /// Which flight software a vehicle runs (`MAV_AUTOPILOT`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -24,6 +25,16 @@ pub enum Autopilot {
     Px4,
     /// Any other, which is talked to as the specification says.
     Other(u8),
+}
+
+impl From<Autopilot> for mission::Autopilot {
+    fn from(autopilot: Autopilot) -> Self {
+        match autopilot {
+            Autopilot::ArduPilot => Self::ArduPilot,
+            Autopilot::Px4 => Self::Px4,
+            Autopilot::Other(_) => Self::Unknown,
+        }
+    }
 }
 
 impl From<u8> for Autopilot {

@@ -24,7 +24,7 @@ pub(crate) struct FakeVehicle {
 }
 
 /// The Python that has pymavlink: `QUAV_PYTHON`, or the project's own environment.
-fn python() -> PathBuf {
+pub(crate) fn python() -> PathBuf {
     let venv = Path::new(env!("CARGO_MANIFEST_DIR")).join(".venv/bin/python");
     let python = std::env::var_os("QUAV_PYTHON").map_or(venv, PathBuf::from);
     assert!(

@@ -1,0 +1,73 @@
+# Everything installs what it needs: a clean Debian machine with Rust, gcc, make and Python 3 will do.
+
+CARGO ?= cargo
+PYTHON ?= python3
+VENV := .venv
+BIN := $(or $(CARGO_TARGET_DIR),target)/release/quavd
+PACKAGES := cmake g++ make pkg-config sqlite3 libsqlite3-dev python3-venv
+
+.PHONY: all build demo test test-rust test-python lint doc bench examples clean system
+
+all: build
+
+# PROJ is built from source and wants cmake and sqlite3; the tests want a venv.
+system:
+	@for tool in cmake g++ pkg-config sqlite3; do command -v $$tool >/dev/null || missing=1; done; \
+	test -e /usr/include/sqlite3.h || missing=1; \
+	if [ -n "$$missing" ]; then \
+		sudo=; [ "$$(id -u)" = 0 ] || sudo=sudo; \
+		$$sudo apt-get update -qq && \
+		DEBIAN_FRONTEND=noninteractive $$sudo apt-get install -y -qq --no-install-recommends $(PACKAGES); \
+	fi
+
+$(VENV)/.ready: sitl/requirements.txt
+	$(PYTHON) -c 'import ensurepip' 2>/dev/null || { \
+		sudo=; [ "$$(id -u)" = 0 ] || sudo=sudo; \
+		$$sudo apt-get update -qq && $$sudo apt-get install -y -qq python3-venv; }
+	$(PYTHON) -m venv $(VENV)
+	$(VENV)/bin/pip install --quiet --disable-pip-version-check -r sitl/requirements.txt
+	touch $@
+
+build: system
+	$(CARGO) build --release --locked
+
+# The main job: a fake vehicle with a mission through no-fly areas, re-planned, uploaded, verified.
+demo: build $(VENV)/.ready
+	$(VENV)/bin/python sitl/demo.py --quavd $(BIN) --scenario fence_examples/s1.plan --out out
+
+test: test-rust test-python
+
+# One runner where there is one; plain cargo test does the same.
+test-rust: system $(VENV)/.ready
+	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
+		QUAV_PYTHON=$(CURDIR)/$(VENV)/bin/python $(CARGO) nextest run --release --locked; \
+	else \
+		QUAV_PYTHON=$(CURDIR)/$(VENV)/bin/python $(CARGO) test --release --locked; \
+	fi
+	$(CARGO) test --release --locked --doc
+
+test-python: $(VENV)/.ready
+	cd sitl && MAVLINK20=1 ../$(VENV)/bin/python -m unittest
+
+lint: system
+	$(CARGO) fmt --check
+	$(CARGO) clippy --release --locked --all-targets -- -D warnings
+
+doc: system
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --locked --no-deps
+
+bench: system
+	$(CARGO) bench --locked
+
+# The pictures in fence_examples/README.md.
+examples: build
+	@mkdir -p fence_examples/pictures
+	@for plan in fence_examples/*.plan; do \
+		name=$$(basename $$plan .plan); \
+		$(BIN) --quiet plan $$plan --out fence_examples/pictures/$$name.svg >/dev/null; \
+		code=$$?; [ $$code = 0 ] || [ $$code = 3 ] || exit $$code; \
+	done
+
+clean:
+	$(CARGO) clean
+	rm -rf $(VENV) out

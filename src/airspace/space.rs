@@ -1,0 +1,315 @@
+//! The airspace of a leg: all regions as barriers, and the two questions a path asks of it, "how
+//! near does this segment come?" and "which region is it?".
+
+use std::fmt;
+use std::str::FromStr;
+
+use geo::{Line, MultiPolygon, Polygon, unary_union};
+use rstar::primitives::{GeomWithData, Rectangle};
+use rstar::{AABB, RTree};
+
+use super::barrier::{Barrier, BarrierIndex, BarrierShape};
+use super::outline::{AirspaceError, Outline, RegionProblem, contains, edges, outline};
+use crate::fence::{FenceRole, FenceSet};
+use crate::geodesy::{LocalFrame, Xy};
+
+/// A region's index in the [`FenceSet`] that the airspace was built from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct RegionId(pub u32);
+
+/// What several inclusion regions mean together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum InclusionRule {
+    /// Inside all of them, as ArduPilot (without the union option) and PX4 do.
+    #[default]
+    All,
+    /// Inside at least one of them.
+    Any,
+}
+
+impl fmt::Display for InclusionRule {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::All => "all",
+            Self::Any => "any",
+        })
+    }
+}
+
+impl FromStr for InclusionRule {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "all" => Ok(Self::All),
+            "any" => Ok(Self::Any),
+            _ => Err(format!("'{text}' is neither all nor any")),
+        }
+    }
+}
+
+/// A boundary that a path may have to go round, with the forbidden side on the left of its
+/// edges (a counter-clockwise obstacle, or a clockwise inclusion).
+#[derive(Debug, Clone, PartialEq)]
+pub enum Boundary {
+    /// A ring of walls.
+    Ring(Vec<Xy>),
+    /// A round obstacle.
+    Disc {
+        /// Its centre.
+        centre: Xy,
+        /// Its radius, metres.
+        radius: f64,
+    },
+}
+
+/// The number of sides of a polygon that stands for an inclusion circle in a union. It is
+/// inscribed: nothing outside the circle is allowed.
+const CIRCLE_SIDES: u32 = 256;
+
+/// Fences as planar barriers in the metres of one local frame, unbuffered.
+#[derive(Debug)]
+pub struct Airspace {
+    outlines: Vec<Outline>,
+    barriers: BarrierIndex,
+    solids: RTree<GeomWithData<Rectangle<[f64; 2]>, (RegionId, usize)>>,
+    /// With [`InclusionRule::Any`]: the union of all inclusions, where there are any.
+    union: Option<MultiPolygon>,
+    zones: Vec<RegionId>,
+    warnings: Vec<String>,
+}
+
+impl Airspace {
+    /// Makes every region of a fence set planar and indexes it.
+    ///
+    /// # Errors
+    /// [`AirspaceError`] naming the first region that cannot be used.
+    pub fn new(
+        fences: &FenceSet,
+        frame: &LocalFrame,
+        rule: InclusionRule,
+    ) -> Result<Self, AirspaceError> {
+        let mut outlines = Vec::with_capacity(fences.regions.len());
+        let mut warnings = Vec::new();
+        for region in &fences.regions {
+            let (shape, warning) = outline(region, frame)?;
+            if rule == InclusionRule::Any
+                && warning.is_some()
+                && region.role == FenceRole::Inclusion
+            {
+                let origin = region.origin.clone();
+                return Err(AirspaceError { origin, problem: RegionProblem::CrossingZone });
+            }
+            outlines.push(shape);
+            warnings.extend(warning);
+        }
+        let zones: Vec<RegionId> = regions(&outlines)
+            .filter(|(_, outline)| matches!(outline, Outline::Zone(_) | Outline::ZoneDisc { .. }))
+            .map(|(id, _)| id)
+            .collect();
+        let union = (rule == InclusionRule::Any && zones.len() > 1)
+            .then(|| unary_union(&zone_polygons(&outlines, &zones)));
+        let mut space = Self {
+            barriers: BarrierIndex::new(Vec::new()),
+            solids: RTree::bulk_load(solid_boxes(&outlines)),
+            outlines,
+            union,
+            zones,
+            warnings,
+        };
+        let mut barriers = Vec::new();
+        for (region, boundary) in space.boundaries() {
+            match boundary {
+                Boundary::Ring(ring) => {
+                    barriers.extend(edges(&ring).map(|(a, b)| Barrier {
+                        shape: BarrierShape::Wall(Line::new(a, b)),
+                        region,
+                    }))
+                }
+                Boundary::Disc { centre, radius } => {
+                    barriers.push(Barrier { shape: BarrierShape::Disc { centre, radius }, region })
+                }
+            }
+        }
+        space.barriers = BarrierIndex::new(barriers);
+        Ok(space)
+    }
+
+    /// What was odd about the regions, a sentence each.
+    #[must_use]
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// The regions in the plane, by their index in the fence set.
+    #[must_use]
+    pub fn outlines(&self) -> &[Outline] {
+        &self.outlines
+    }
+
+    /// Every boundary, with the forbidden side on the left. Inclusion circles are not among
+    /// them: being convex, they are judged by the end points of a segment.
+    #[must_use]
+    pub fn boundaries(&self) -> Vec<(RegionId, Boundary)> {
+        let mut boundaries = Vec::new();
+        for (id, outline) in regions(&self.outlines) {
+            match outline {
+                Outline::Solid(rings) => {
+                    boundaries.extend(rings.iter().map(|ring| (id, Boundary::Ring(ring.clone()))));
+                }
+                Outline::SolidDisc { centre, radius } => {
+                    boundaries.push((id, Boundary::Disc { centre: *centre, radius: *radius }));
+                }
+                Outline::Zone(ring) if self.union.is_none() => {
+                    boundaries.push((id, Boundary::Ring(ring.iter().rev().copied().collect())));
+                }
+                Outline::Zone(_) | Outline::ZoneDisc { .. } => {}
+            }
+        }
+        if let (Some(union), Some(&first)) = (&self.union, self.zones.first()) {
+            // Outlines of the union belong to no single region: they are blamed on the first.
+            for polygon in union {
+                for ring in std::iter::once(polygon.exterior()).chain(polygon.interiors()) {
+                    let outer = std::ptr::eq(ring, polygon.exterior());
+                    let mut points: Vec<Xy> = ring.coords().skip(1).copied().collect();
+                    let counter_clockwise = super::outline::signed_area(&points) > 0.0;
+                    if counter_clockwise == outer {
+                        points.reverse();
+                    }
+                    boundaries.push((first, Boundary::Ring(points)));
+                }
+            }
+        }
+        boundaries
+    }
+
+    /// How near a segment comes to any boundary, metres, looked for up to `at_most`; 0 where it
+    /// meets or is beyond one. `None`: nothing is nearer than `at_most`.
+    #[must_use]
+    pub fn nearest(&self, a: Xy, b: Xy, at_most: f64) -> Option<(f64, RegionId)> {
+        self.search(a, b, at_most, 0.0)
+    }
+
+    /// The clearance of a segment in metres: [`Airspace::nearest`] without its region, and
+    /// without a limit. Infinite in an airspace without regions.
+    #[must_use]
+    pub fn clearance(&self, a: Xy, b: Xy) -> f64 {
+        // Small radii first, so that the search is a small one wherever something is near.
+        [32.0, 1024.0, f64::INFINITY]
+            .into_iter()
+            .find_map(|at_most| self.nearest(a, b, at_most))
+            .map_or(f64::INFINITY, |(distance, _)| distance)
+    }
+
+    /// The region that a segment comes nearer to than `margin` metres (or meets, or is on the
+    /// wrong side of), or `None` where the segment is clear. With several, any of them.
+    #[must_use]
+    pub fn blocker(&self, a: Xy, b: Xy, margin: f64) -> Option<RegionId> {
+        // A wall that is met bars the way also where no margin is asked for.
+        let margin = margin.max(f64::MIN_POSITIVE);
+        self.search(a, b, margin, margin).map(|(_, region)| region)
+    }
+
+    /// Whether a segment keeps at least `margin` metres from everything.
+    #[must_use]
+    pub fn is_clear(&self, a: Xy, b: Xy, margin: f64) -> bool {
+        self.blocker(a, b, margin).is_none()
+    }
+
+    /// With [`InclusionRule::Any`], the union of several inclusions: inside it is allowed.
+    #[must_use]
+    pub fn union(&self) -> Option<&MultiPolygon> {
+        self.union.as_ref()
+    }
+
+    /// The index over the barriers.
+    #[must_use]
+    pub fn barriers(&self) -> &BarrierIndex {
+        &self.barriers
+    }
+
+    fn search(&self, a: Xy, b: Xy, at_most: f64, enough: f64) -> Option<(f64, RegionId)> {
+        // Side first: a segment that meets no wall is on one side with its whole length.
+        if let Some(region) = self.forbidden_side(a) {
+            return Some((0.0, region));
+        }
+        let mut nearest = self.barriers.nearest(Line::new(a, b), at_most, enough);
+        if self.union.is_none() {
+            for &region in &self.zones {
+                if let Outline::ZoneDisc { centre, radius } = self.outlines[region.0 as usize] {
+                    let reach = |p: Xy| (p.x - centre.x).hypot(p.y - centre.y);
+                    let distance = (radius - reach(a).max(reach(b))).max(0.0);
+                    if distance < nearest.map_or(at_most, |(best, _)| best) {
+                        nearest = Some((distance, region));
+                    }
+                }
+            }
+        }
+        nearest
+    }
+
+    /// The region whose forbidden side a point is on. Discs are left to the distances.
+    fn forbidden_side(&self, point: Xy) -> Option<RegionId> {
+        let here = AABB::from_point([point.x, point.y]);
+        for entry in self.solids.locate_in_envelope_intersecting(&here) {
+            let (region, ring) = entry.data;
+            if let Outline::Solid(rings) = &self.outlines[region.0 as usize]
+                && contains(&rings[ring], point)
+            {
+                return Some(region);
+            }
+        }
+        if let Some(union) = &self.union {
+            let inside = union.iter().any(|polygon| {
+                let within = |ring: &geo::LineString| contains(&ring.0[..ring.0.len() - 1], point);
+                within(polygon.exterior()) && !polygon.interiors().iter().any(within)
+            });
+            return if inside { None } else { self.zones.first().copied() };
+        }
+        self.zones.iter().copied().find(|region| match &self.outlines[region.0 as usize] {
+            Outline::Zone(ring) => !contains(ring, point),
+            _ => false,
+        })
+    }
+}
+
+fn regions(outlines: &[Outline]) -> impl Iterator<Item = (RegionId, &Outline)> {
+    outlines.iter().enumerate().map(|(i, outline)| (RegionId(i as u32), outline))
+}
+
+fn solid_boxes(outlines: &[Outline]) -> Vec<GeomWithData<Rectangle<[f64; 2]>, (RegionId, usize)>> {
+    let mut boxes = Vec::new();
+    for (id, outline) in regions(outlines) {
+        if let Outline::Solid(rings) = outline {
+            for (k, ring) in rings.iter().enumerate() {
+                let mut envelope = AABB::from_point([ring[0].x, ring[0].y]);
+                for point in ring {
+                    use rstar::Envelope;
+                    envelope.merge(&AABB::from_point([point.x, point.y]));
+                }
+                boxes.push(GeomWithData::new(
+                    Rectangle::from_corners(envelope.lower(), envelope.upper()),
+                    (id, k),
+                ));
+            }
+        }
+    }
+    boxes
+}
+
+fn zone_polygons(outlines: &[Outline], zones: &[RegionId]) -> Vec<Polygon> {
+    zones
+        .iter()
+        .filter_map(|id| match &outlines[id.0 as usize] {
+            Outline::Zone(ring) => Some(Polygon::new(ring.iter().copied().collect(), vec![])),
+            Outline::ZoneDisc { centre, radius } => {
+                let rim = (0..CIRCLE_SIDES).map(|i| {
+                    let angle = std::f64::consts::TAU * f64::from(i) / f64::from(CIRCLE_SIDES);
+                    *centre + Xy { x: angle.cos(), y: angle.sin() } * *radius
+                });
+                Some(Polygon::new(rim.collect(), vec![]))
+            }
+            _ => None,
+        })
+        .collect()
+}

@@ -1,0 +1,88 @@
+//! The commands of `quavd`. This is the edge: files, links, the terminal and exit codes are here
+//! and nowhere else.
+//!
+//! - [`options`]: what the commands have in common, with the names of the configuration file;
+//! - [`files`]: scenarios, missions and fences from files, results to files;
+//! - [`progress`]: what is shown while something runs;
+//! - [`plan`], [`check`], [`once`], [`qaoa`]: one command each;
+//! - [`memory`]: what the machine has left;
+//! - [`exit`]: errors and their exit codes.
+
+pub mod check;
+pub mod exit;
+pub mod files;
+pub mod memory;
+pub mod once;
+pub mod options;
+pub mod plan;
+pub mod progress;
+pub mod qaoa;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+pub use exit::CliError;
+
+/// Plans a drone's mission around no-fly areas with QAOA, and puts it on the vehicle.
+#[derive(Debug, Parser)]
+#[command(name = "quavd", version, about, propagate_version = true)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    /// Only results and errors: no progress, no warnings.
+    #[arg(long, short, global = true)]
+    quiet: bool,
+    /// More about what is done, on stderr; twice for every message. RUST_LOG overrides it.
+    #[arg(long, short, global = true, action = clap::ArgAction::Count)]
+    verbose: u8,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Read from the vehicle, plan, upload, verify, exit.
+    Once(once::OnceArgs),
+    /// Plan a mission from files; no vehicle needed.
+    Plan(plan::PlanArgs),
+    /// Judge any mission against any fences.
+    Check(check::CheckArgs),
+    /// Run QAOA alone on an Ising problem.
+    Qaoa(qaoa::QaoaArgs),
+}
+
+/// Runs the command of a parsed command line, prints its result on stdout and its error on
+/// stderr, and returns the exit code.
+#[must_use]
+pub fn run(cli: Cli) -> ExitCode {
+    start_log(cli.verbose, cli.quiet);
+    let shown = progress::Shown::new(cli.quiet);
+    let outcome = match cli.command {
+        Command::Once(args) => once::run(args, &shown),
+        Command::Plan(args) => plan::run(&args, &shown),
+        Command::Check(args) => check::run(&args, &shown),
+        Command::Qaoa(args) => qaoa::run(&args).map_err(CliError::from),
+    };
+    match outcome {
+        Ok(text) => exit::print(&text, ExitCode::SUCCESS),
+        Err(error) => error.report(),
+    }
+}
+
+/// Logs go to stderr, never to stdout.
+fn start_log(verbose: u8, quiet: bool) {
+    let level = match (quiet, verbose) {
+        (true, _) => "error",
+        (_, 0) => "warn",
+        (_, 1) => "info",
+        _ => "debug",
+    };
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
+        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new(format!("quav={level}")));
+    // A second subscriber (in tests) is no reason to fail.
+    let _ = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_target(false)
+        .without_time()
+        .try_init();
+}

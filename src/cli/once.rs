@@ -1,0 +1,321 @@
+//! `quavd once`: read from the vehicle, plan, upload, verify, exit.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use tokio_util::sync::CancellationToken;
+
+use super::CliError;
+use super::files::{self, out_format};
+use super::options::PlanningArgs;
+use super::plan::{Delivered, Outcome, planned_scenario};
+use super::progress::Shown;
+use crate::fence::FenceSet;
+use crate::fence::items::decode_fence;
+use crate::formats::Scenario;
+use crate::geodesy::LatLon;
+use crate::link::{ComponentId, Endpoint, Identity, Link, SystemId, Transport};
+use crate::mission::{self, Mission, MissionItem, MissionType};
+use crate::replan::{self, Input, Options, Replanned, replan};
+use crate::store::Store;
+use crate::vehicle::numbering::{to_mission, to_vehicle};
+use crate::vehicle::readback::differences;
+use crate::vehicle::replace::{Replacement, WhileArmed, pilots_own, replace, restore, settle};
+use crate::vehicle::{Autopilot, Search, Vehicle, find};
+
+/// How long to wait for the vehicle's home and position.
+const PLACE_PATIENCE: Duration = Duration::from_secs(5);
+
+/// The arguments of `quavd once`.
+#[derive(Debug, Args)]
+pub struct OnceArgs {
+    /// The vehicle: serial:/dev/ttyAMA0:921600, udpin:0.0.0.0:14550, udpout:HOST:PORT,
+    /// tcpout:HOST:PORT or tcpin:HOST:PORT.
+    #[arg(long, value_name = "URL")]
+    pub connect: Endpoint,
+    /// Plan and show, but write nothing to the vehicle.
+    #[arg(long)]
+    pub dry_run: bool,
+    /// Put back the mission (and fence) that the vehicle held before quavd wrote to it, and exit.
+    #[arg(long, conflicts_with_all = ["dry_run", "out"])]
+    pub restore: bool,
+    /// The vehicle's system id, where several are on the link.
+    #[arg(long, value_parser = clap::value_parser!(u8).range(1..))]
+    pub system: Option<u8>,
+    /// quavd's own component id on the vehicle.
+    #[arg(long, default_value_t = 195, value_parser = clap::value_parser!(u8).range(2..))]
+    pub component: u8,
+    /// How long to wait for the vehicle's first heartbeat, seconds.
+    #[arg(long, default_value_t = 15, value_parser = clap::value_parser!(u16).range(1..), value_name = "S")]
+    pub wait: u16,
+    /// Where originals and upload records are kept.
+    #[arg(long, env = "STATE_DIRECTORY", value_name = "DIR")]
+    pub state_dir: Option<PathBuf>,
+    /// Print one JSON document on stdout.
+    #[arg(long)]
+    pub json: bool,
+    /// Write the result to a file; the suffix gives the format (.plan, .waypoints, .geojson, .kml,
+    /// .svg). May be repeated.
+    #[arg(long, value_name = "FILE")]
+    pub out: Vec<PathBuf>,
+    /// How to plan.
+    #[command(flatten)]
+    pub planning: PlanningArgs,
+}
+
+/// Runs the command; returns what goes to stdout.
+///
+/// # Errors
+/// [`CliError`] with the exit code.
+pub fn run(args: OnceArgs, shown: &Shown) -> Result<String, CliError> {
+    for path in &args.out {
+        out_format(path)?;
+    }
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .enable_all()
+        .build()
+        .map_err(|error| CliError::Usage(format!("cannot start: {error}")))?;
+    runtime.block_on(async {
+        let cancel = CancellationToken::new();
+        shown.doing(format!("connecting to {}", args.connect));
+        let transport = Transport::open(&args.connect).await?;
+        let identity = Identity {
+            system: SystemId(args.system.unwrap_or(1)),
+            component: ComponentId(args.component),
+        };
+        let (link, task) = Link::start(transport, identity, cancel);
+        let outcome = with_link(&args, &link, shown).await;
+        shown.clear();
+        task.close().await;
+        outcome
+    })
+}
+
+async fn with_link(args: &OnceArgs, link: &Link, shown: &Shown) -> Result<String, CliError> {
+    let store = Store::open(&state_directory(args.state_dir.as_ref())?)?;
+    shown.doing("waiting for the vehicle");
+    let search = Search {
+        system: args.system.map(SystemId),
+        patience: Duration::from_secs(u64::from(args.wait)),
+        ..Search::default()
+    };
+    let vehicle = find(link, &search).await?;
+    let outcome = with_vehicle(args, &vehicle, &store, shown).await;
+    vehicle.close().await;
+    outcome
+}
+
+async fn with_vehicle(
+    args: &OnceArgs,
+    vehicle: &Vehicle,
+    store: &Store,
+    shown: &Shown,
+) -> Result<String, CliError> {
+    let mut on_step = |step| shown.step(step);
+    if args.restore {
+        return put_back(vehicle, store, shown).await;
+    }
+    if !args.dry_run {
+        for plan in [MissionType::Fence, MissionType::Mission] {
+            let settled = settle(vehicle, store, plan, WhileArmed::Refuse, &mut on_step).await?;
+            if let Some(settled) = settled {
+                shown
+                    .warn(&[format!("an earlier upload of the {plan} was not settled: {settled}")]);
+            }
+        }
+    }
+
+    let began = Instant::now();
+    let read = read(vehicle, store, args, shown).await?;
+    shown.warn(&read.scenario.warnings);
+    let options = args.planning.options();
+    if read.scenario.mission.items.is_empty() {
+        return Err(CliError::Usage(
+            "the vehicle holds no mission; upload one with a ground station first".to_owned(),
+        ));
+    }
+    let load = began.elapsed();
+    let planned = plan_off_thread(&read, &options, shown).await;
+    let warnings = &read.scenario.warnings;
+    let outcome = Outcome { planned, options: &options, warnings, load, total: began.elapsed() };
+
+    let mut done = Delivery { written: false, verified: false };
+    if let Ok(planned) = &outcome.planned {
+        let home_slot =
+            (vehicle.autopilot() == Autopilot::ArduPilot).then(|| read.held.first()).flatten();
+        let intended = if planned.is_changed() {
+            to_vehicle(vehicle.autopilot(), &planned.mission, home_slot)
+        } else {
+            read.original.clone()
+        };
+        let same = differences(vehicle.autopilot(), MissionType::Mission, &intended, &read.held)
+            .is_empty();
+        done.verified = same;
+        if !same && !args.dry_run {
+            let replacement = Replacement {
+                mission_type: MissionType::Mission,
+                original: read.original.clone(),
+                before: read.held.clone(),
+                intended,
+            };
+            replace(vehicle, store, replacement, WhileArmed::Refuse, &mut on_step).await?;
+            done = Delivery { written: true, verified: true };
+        }
+        shown.clear();
+        files::write_all(&args.out, &planned_scenario(&read.scenario, planned), || String::new())?;
+    }
+    outcome.told(args.json, Some(done.told(vehicle, args.dry_run)))
+}
+
+/// What `--restore` does: both plans that quavd may have written.
+async fn put_back(vehicle: &Vehicle, store: &Store, shown: &Shown) -> Result<String, CliError> {
+    let mut on_step = |step| shown.step(step);
+    settle(vehicle, store, MissionType::Fence, WhileArmed::Refuse, &mut on_step).await?;
+    let record =
+        restore(vehicle, store, MissionType::Mission, WhileArmed::Refuse, &mut on_step).await?;
+    shown.clear();
+    Ok(format!(
+        "the original mission ({} items, saved in {}) is on the vehicle: read back and compared\n",
+        record.original.len(),
+        store.path_of(&record).display()
+    ))
+}
+
+/// What was read from a vehicle.
+struct Read {
+    /// The pilot's mission, the fences with those of the command line, the rally points.
+    scenario: Scenario,
+    /// The mission list that the vehicle holds, in its numbering.
+    held: Vec<MissionItem>,
+    /// The pilot's own mission list: what is held, or what quavd's last upload was made from.
+    original: Vec<MissionItem>,
+    start: Option<LatLon>,
+    rally: Vec<LatLon>,
+    autopilot: mission::Autopilot,
+}
+
+async fn read(
+    vehicle: &Vehicle,
+    store: &Store,
+    args: &OnceArgs,
+    shown: &Shown,
+) -> Result<Read, CliError> {
+    let mut on_progress = |progress| shown.transfer(progress);
+    let held = vehicle.download(MissionType::Mission, &mut on_progress).await?.items;
+    let fence = vehicle.download(MissionType::Fence, &mut on_progress).await?.items;
+    let rally = vehicle.download(MissionType::Rally, &mut on_progress).await?.items;
+    shown.doing("waiting for the vehicle's home and position");
+    let known =
+        |state: &crate::vehicle::VehicleState| state.home.is_some() && state.position.is_some();
+    let _ = vehicle.wait_for(PLACE_PATIENCE, known).await;
+    let state = vehicle.state();
+
+    let original = pilots_own(vehicle, store, MissionType::Mission, &held).await?;
+    let mission = to_mission(vehicle.autopilot(), &original, state.home);
+    let decoded = decode_fence(&fence, None)?;
+    let (mut fences, mut warnings) = (decoded.fences, decoded.warnings);
+    files::add_fences(&mut fences, &mut warnings, &args.planning.safety)?;
+    let places = rally_places(&rally)?;
+    // The vehicle stands at home before it takes off; in flight its own place counts.
+    let start = state.position.map(|at| at.position).or(mission.home.map(|home| home.position));
+    let scenario = Scenario { mission, fences, rally, warnings, ..Scenario::default() };
+    let autopilot = vehicle.autopilot().into();
+    Ok(Read { scenario, held, original, start, rally: places, autopilot })
+}
+
+/// The places of rally points.
+///
+/// # Errors
+/// [`CliError::Usage`] naming the point that is no place.
+pub(super) fn rally_places(rally: &[MissionItem]) -> Result<Vec<LatLon>, CliError> {
+    rally
+        .iter()
+        .filter(|item| item.command == mission::Command::NAV_RALLY_POINT)
+        .map(|item| {
+            item.position()
+                .map_err(|error| CliError::Usage(format!("rally point {}: {error}", item.seq + 1)))
+        })
+        .collect()
+}
+
+/// Plans on a thread of its own (PROJ and the planner block), with progress and Ctrl-C.
+async fn plan_off_thread(
+    read: &Read,
+    options: &Options,
+    shown: &Shown,
+) -> Result<Replanned, CliError> {
+    let cancelled = Arc::new(AtomicBool::new(false));
+    let task = {
+        let (mission, fences): (Mission, FenceSet) =
+            (read.scenario.mission.clone(), read.scenario.fences.clone());
+        let (rally, start, autopilot) = (read.rally.clone(), read.start, read.autopilot);
+        let (options, shown, cancelled) = (options.clone(), shown.clone(), Arc::clone(&cancelled));
+        tokio::task::spawn_blocking(move || {
+            let input =
+                Input { mission: &mission, fences: &fences, rally: &rally, start, autopilot };
+            let mut leg = String::new();
+            let watch = |progress: replan::Progress<'_>| shown.planning(&progress, &mut leg);
+            replan(&input, &options, &cancelled, watch)
+        })
+    };
+    tokio::pin!(task);
+    let finished = tokio::select! {
+        finished = &mut task => finished,
+        _ = tokio::signal::ctrl_c() => {
+            cancelled.store(true, Ordering::Relaxed);
+            task.await
+        }
+    };
+    match finished {
+        Ok(planned) => planned.map_err(CliError::from),
+        Err(panic) => Err(CliError::NoPath {
+            reason: format!(
+                "the planner failed ({panic}); nothing was written; please report this"
+            ),
+            document: None,
+        }),
+    }
+}
+
+/// What became of the plan on the vehicle.
+#[derive(Debug, Clone, Copy)]
+struct Delivery {
+    written: bool,
+    verified: bool,
+}
+
+impl Delivery {
+    fn told(self, vehicle: &Vehicle, dry_run: bool) -> Delivered {
+        let note = match (self.written, self.verified, dry_run) {
+            (true, ..) => "uploaded, read back and compared: the vehicle holds it",
+            (false, true, _) => "the vehicle already holds it: nothing was written",
+            (false, false, true) => "dry run: nothing was written",
+            (false, false, false) => "nothing was written to the vehicle",
+        };
+        Delivered {
+            system: vehicle.node().system.0,
+            autopilot: vehicle.autopilot().to_string(),
+            uploaded: self.written,
+            verified: self.verified,
+            note,
+        }
+    }
+}
+
+/// Where records are kept: the option (or systemd's `STATE_DIRECTORY`), else the user's state
+/// directory.
+fn state_directory(chosen: Option<&PathBuf>) -> Result<PathBuf, CliError> {
+    if let Some(path) = chosen {
+        return Ok(path.clone());
+    }
+    let base = std::env::var_os("XDG_STATE_HOME")
+        .map(PathBuf::from)
+        .filter(|path| path.is_absolute())
+        .or_else(|| std::env::home_dir().map(|home| home.join(".local/state")));
+    base.map(|base| base.join("quavd"))
+        .ok_or_else(|| CliError::Usage("no place for records: give --state-dir DIR".to_owned()))
+}

@@ -1,0 +1,162 @@
+//! `quavd plan`: the planning of `once` from files, without a vehicle.
+
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use serde::Serialize;
+
+use super::CliError;
+use super::files::{self, out_format};
+use super::options::PlanningArgs;
+use super::progress::Shown;
+use crate::formats::Scenario;
+use crate::geodesy::LatLon;
+use crate::replan::{Input, Options, Progress, Replanned, replan};
+use crate::report::Run;
+use crate::report::json::PlanDocument;
+use crate::report::summary::plan_summary;
+
+/// The arguments of `quavd plan`.
+#[derive(Debug, Args)]
+pub struct PlanArgs {
+    /// Mission and fences: .plan, waypoints or GeoJSON; more fences with --fence.
+    pub scenario: PathBuf,
+    /// Print one JSON document on stdout.
+    #[arg(long)]
+    pub json: bool,
+    /// Write the result to a file; the suffix gives the format (.plan, .waypoints, .geojson, .kml,
+    /// .svg). May be repeated.
+    #[arg(long, value_name = "FILE")]
+    pub out: Vec<PathBuf>,
+    /// How to plan.
+    #[command(flatten)]
+    pub planning: PlanningArgs,
+}
+
+/// Runs the command; returns what goes to stdout.
+///
+/// # Errors
+/// [`CliError`]: exit code 3 where there is no safe path.
+pub fn run(args: &PlanArgs, shown: &Shown) -> Result<String, CliError> {
+    for path in &args.out {
+        out_format(path)?;
+    }
+    let began = Instant::now();
+    let scenario = files::scenario(&args.scenario, &args.planning.safety)?;
+    if scenario.mission.items.is_empty() {
+        return Err(files::FileError::NoMission(args.scenario.clone()).into());
+    }
+    shown.warn(&scenario.warnings);
+    let rally = super::once::rally_places(&scenario.rally)?;
+    let options = args.planning.options();
+    let input = Input {
+        mission: &scenario.mission,
+        fences: &scenario.fences,
+        rally: &rally,
+        start: position_of_start(&scenario),
+        autopilot: scenario.vehicle.autopilot,
+    };
+    let load = began.elapsed();
+    let mut leg = String::new();
+    let watch = |progress: Progress<'_>| shown.planning(&progress, &mut leg);
+    let planned = replan(&input, &options, &AtomicBool::new(false), watch);
+    let planned = planned.map_err(CliError::from);
+    shown.clear();
+    let warnings = &scenario.warnings;
+    let outcome = Outcome { planned, options: &options, warnings, load, total: began.elapsed() };
+    if let Ok(planned) = &outcome.planned {
+        files::write_all(&args.out, &planned_scenario(&scenario, planned), || String::new())?;
+    }
+    outcome.told(args.json, None)
+}
+
+/// Where a file's vehicle stands: home, where the file has one.
+pub(super) fn position_of_start(scenario: &Scenario) -> Option<LatLon> {
+    scenario.mission.home.map(|home| home.position)
+}
+
+/// The scenario with the planned mission in place of its own.
+pub(super) fn planned_scenario(scenario: &Scenario, planned: &Replanned) -> Scenario {
+    Scenario { mission: planned.mission.clone(), ..scenario.clone() }
+}
+
+/// What planning came to, to be told to a person or a program.
+pub(super) struct Outcome<'a> {
+    pub(super) planned: Result<Replanned, CliError>,
+    pub(super) options: &'a Options,
+    /// What was odd about the input.
+    pub(super) warnings: &'a [String],
+    pub(super) load: Duration,
+    pub(super) total: Duration,
+}
+
+/// What became of the plan on a vehicle.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Delivered {
+    /// The vehicle's system id.
+    pub(super) system: u8,
+    /// Its flight software.
+    pub(super) autopilot: String,
+    /// Whether anything was written to it.
+    pub(super) uploaded: bool,
+    /// Whether it was read back and is what was planned.
+    pub(super) verified: bool,
+    /// The same in words.
+    #[serde(skip)]
+    pub(super) note: &'static str,
+}
+
+/// The document of `--json`.
+#[derive(Serialize)]
+struct Document {
+    #[serde(flatten)]
+    plan: PlanDocument,
+    /// Only of `quavd once`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    vehicle: Option<Delivered>,
+}
+
+impl Outcome<'_> {
+    /// The text for stdout, or the error with its document.
+    pub(super) fn told(self, json: bool, delivered: Option<Delivered>) -> Result<String, CliError> {
+        let run = Run {
+            options: self.options,
+            warnings: self.warnings,
+            fallback: None,
+            load: self.load,
+            total: self.total,
+        };
+        match self.planned {
+            Ok(planned) if json => document(PlanDocument::planned(&planned, &run), delivered),
+            Ok(planned) => {
+                let mut text = plan_summary(&planned, &run);
+                if let Some(delivered) = delivered {
+                    text.push_str(&format!("Vehicle {}: {}.\n", delivered.system, delivered.note));
+                }
+                Ok(text)
+            }
+            Err(CliError::NoPath { reason, .. }) => {
+                let document = json
+                    .then(|| document(PlanDocument::failed(&reason, None, &run), delivered))
+                    .transpose()?;
+                Err(CliError::NoPath { reason, document })
+            }
+            Err(other) => Err(other),
+        }
+    }
+}
+
+fn document(plan: PlanDocument, vehicle: Option<Delivered>) -> Result<String, CliError> {
+    to_json(&Document { plan, vehicle })
+}
+
+/// A document as one line of JSON.
+pub(super) fn to_json(document: &impl Serialize) -> Result<String, CliError> {
+    let mut text = serde_json::to_string(document).map_err(|error| {
+        CliError::Usage(format!("the result cannot be written as JSON: {error}"))
+    })?;
+    text.push('\n');
+    Ok(text)
+}

@@ -1,0 +1,98 @@
+//! From a scenario to features.
+
+use serde_json::{Map, Value, json};
+
+use super::{Feature, Shape};
+use crate::fence::{FenceRegion, FenceRole, FenceShape};
+use crate::formats::Scenario;
+use crate::formats::error::{Place, WriteError};
+use crate::formats::item::{FileItem, decimal, holds_degrees, json_number, jumps_from_indices};
+use crate::geodesy::LatLon;
+use crate::mission::MissionItem;
+
+/// The scenario as features: home, mission items, a track for the eye, regions, return point,
+/// rally points.
+pub(in crate::formats) fn features(scenario: &Scenario) -> Result<Vec<Feature>, WriteError> {
+    let mut features = Features(Vec::new());
+    if let Some(home) = scenario.mission.home {
+        let altitude = json_number(decimal(home.altitude_amsl));
+        let properties = json!({ "role": "home", "altitude_amsl": altitude });
+        features.push(properties, vec![Shape::Point(home.position)]);
+    }
+    let mut track = Vec::new();
+    for (index, item) in jumps_from_indices(&scenario.mission, 0)?.iter().enumerate() {
+        let point = drawn_position(item, Place::MissionItem(index + 1))?;
+        track.extend(point);
+        let FileItem { command, frame, params, autocontinue } = FileItem::from_item(item);
+        let mut properties = json!({
+            "seq": index,
+            "command": command,
+            "frame": frame,
+            "autocontinue": autocontinue,
+        });
+        if point.is_some() {
+            properties["params"] = params[..4].iter().copied().map(json_number).collect();
+            properties["altitude"] = json_number(params[6]);
+        } else {
+            properties["params"] = params.map(json_number).to_vec().into();
+        }
+        features.push(properties, point.map(Shape::Point).into_iter().collect());
+    }
+    if track.len() > 1 {
+        features.push(json!({ "role": "track" }), vec![Shape::Line(track)]);
+    }
+    for region in &scenario.fences.regions {
+        let (properties, shape) = region_feature(region);
+        features.push(properties, vec![shape]);
+    }
+    if let Some((position, altitude)) = scenario.fences.return_point {
+        let properties = json!({ "role": "return", "altitude": json_number(decimal(altitude)) });
+        features.push(properties, vec![Shape::Point(position)]);
+    }
+    for (index, item) in scenario.rally.iter().enumerate() {
+        let place = Place::RallyPoint(index + 1);
+        let position = item.position().map_err(|error| WriteError::Position { place, error })?;
+        let FileItem { frame, params, .. } = FileItem::from_item(item);
+        let altitude = json_number(params[6]);
+        let properties = json!({ "role": "rally", "frame": frame, "altitude": altitude });
+        features.push(properties, vec![Shape::Point(position)]);
+    }
+    Ok(features.0)
+}
+
+struct Features(Vec<Feature>);
+
+impl Features {
+    fn push(&mut self, properties: Value, shapes: Vec<Shape>) {
+        let Value::Object(properties) = properties else { return };
+        let number = self.0.len() + 1;
+        self.0.push(Feature { shapes, ..Feature::named("feature", number, properties, None) });
+    }
+}
+
+/// Where the item is drawn; `None` where it has no place. Zeros mean "here", not a place in the
+/// Gulf of Guinea.
+fn drawn_position(item: &MissionItem, place: Place) -> Result<Option<LatLon>, WriteError> {
+    if !holds_degrees(item.command, item.frame) || (item.x, item.y) == (0, 0) {
+        return Ok(None);
+    }
+    let position = item.position();
+    Ok(Some(position.map_err(|error| WriteError::Position { place, error })?))
+}
+
+fn region_feature(region: &FenceRegion) -> (Value, Shape) {
+    let fence = match region.role {
+        FenceRole::Inclusion => "inclusion",
+        FenceRole::Exclusion => "exclusion",
+    };
+    let mut properties = Map::new();
+    properties.insert("fence".to_owned(), json!(fence));
+    let shape = match &region.shape {
+        FenceShape::Polygon(ring) => Shape::Polygon { outer: ring.clone(), holes: Vec::new() },
+        FenceShape::Circle { centre, radius } => {
+            properties.insert("radius".to_owned(), json_number(radius.0));
+            Shape::Point(*centre)
+        }
+    };
+    (Value::Object(properties), shape)
+}

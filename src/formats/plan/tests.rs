@@ -1,0 +1,157 @@
+use serde_json::{Value, json};
+
+use crate::formats::{Scenario, read_scenario, write_plan};
+use crate::mission::{Command, Frame};
+
+fn plan(items: &Value, fence: &Value) -> String {
+    json!({
+        "fileType": "Plan", "version": 1, "groundStation": "QGroundControl",
+        "mission": { "version": 2, "plannedHomePosition": [47.0, 8.0, 400], "items": items },
+        "geoFence": fence,
+    })
+    .to_string()
+}
+
+fn no_fence() -> Value {
+    json!({ "version": 2, "polygons": [], "circles": [] })
+}
+
+fn read(items: &Value) -> Scenario {
+    read_scenario("a.plan", plan(items, &no_fence()).as_bytes()).unwrap()
+}
+
+fn item_error(items: &Value) -> String {
+    read_scenario("a.plan", plan(items, &no_fence()).as_bytes()).unwrap_err().to_string()
+}
+
+fn fence_error(fence: &Value) -> String {
+    read_scenario("a.plan", plan(&json!([]), fence).as_bytes()).unwrap_err().to_string()
+}
+
+fn waypoint(id: u32) -> Value {
+    json!({ "type": "SimpleItem", "command": 16, "frame": 3, "doJumpId": id,
+            "params": [0, 0, 0, null, 47.1, 8.1, 30], "autoContinue": true })
+}
+
+fn jump(id: u32, target: u32) -> Value {
+    json!({ "type": "SimpleItem", "command": 177, "frame": 2, "doJumpId": id,
+            "params": [target, 2, 0, 0, 0, 0, 0], "autoContinue": true })
+}
+
+#[test]
+fn null_is_nan() {
+    let params = read(&json!([waypoint(1)])).mission.items[0].params;
+    assert!(params[3].is_nan() && params[..3] == [0.0; 3]);
+}
+
+#[test]
+fn a_survey_is_read_as_the_items_it_stands_for_and_jumps_still_meet() {
+    let survey = json!({ "type": "ComplexItem", "complexItemType": "survey", "version": 5,
+        "angle": 0, "polygon": [[47, 8], [47, 8.1], [47.1, 8]],
+        "TransectStyleComplexItem": { "version": 2, "Items": [waypoint(2), waypoint(3)],
+                                      "VisualTransectPoints": [[47, 8]] } });
+    let scenario = read(&json!([waypoint(1), survey, jump(4, 3)]));
+    assert_eq!(scenario.mission.items.len(), 4);
+    assert_eq!(scenario.mission.items[3].params[0], 2.0);
+    let expected = "a.plan, mission item 2: the survey item is read as the 2 items";
+    assert!(scenario.warnings[0].starts_with(expected));
+    // Numbers of its own: the jump goes to the same item in the plan that is written.
+    let again = read_scenario("b", write_plan(&scenario).unwrap().as_bytes()).unwrap();
+    assert_eq!(again.mission.items[3].params[0], 2.0);
+}
+
+#[test]
+fn a_jump_to_an_id_that_stands_twice_is_an_error() {
+    let error = item_error(&json!([waypoint(1), waypoint(1), jump(3, 1)]));
+    assert!(error.starts_with("a.plan, mission item 3: the target of DO_JUMP"), "{error}");
+}
+
+#[test]
+fn a_fixed_wing_landing_is_read_as_qgroundcontrol_uploads_it() {
+    let landing = json!({ "type": "ComplexItem", "complexItemType": "fwLandingPattern",
+        "version": 2, "altitudesAreRelative": true, "landCoordinate": [47.0, 8.0, 0],
+        "landingApproachCoordinate": [47.01, 8.0, 40], "loiterClockwise": false,
+        "loiterRadius": 75, "stopTakingPhotos": true, "stopVideoPhotos": true,
+        "useLoiterToAlt": true, "valueSetIsDistance": true });
+    let items = read(&json!([landing])).mission.items;
+    let commands: Vec<_> = items.iter().map(|item| item.command.0).collect();
+    assert_eq!(commands, [189, 206, 2001, 2501, 31, 21]);
+    assert_eq!(items[4].params, [1.0, -75.0, 0.0, 1.0]);
+    assert_eq!((items[4].frame, items[4].z), (Frame::GLOBAL_RELATIVE_ALT, 40.0));
+    assert_eq!((items[5].command, items[5].x), (Command::NAV_LAND, 470_000_000));
+}
+
+#[test]
+fn a_complex_item_that_does_not_say_what_is_flown_is_an_error_that_names_it() {
+    for kind in ["StructureScan", "survey", "fwLandingPattern", "new thing"] {
+        let item = json!({ "type": "ComplexItem", "complexItemType": kind, "version": 3 });
+        let error = item_error(&json!([waypoint(1), item]));
+        assert!(error.starts_with("a.plan, mission item 2:") && error.contains(kind), "{error}");
+    }
+}
+
+#[test]
+fn items_of_the_wrong_shape_are_errors_that_name_them() {
+    let broken = |key: &str, value: Value| {
+        let mut item = waypoint(2);
+        item[key] = value;
+        item_error(&json!([waypoint(1), item]))
+    };
+    let starts = |error: String| assert!(error.starts_with("a.plan, mission item 2:"), "{error}");
+    starts(broken("command", json!(70_000)));
+    starts(broken("command", json!(16.5)));
+    starts(broken("command", Value::Null));
+    starts(broken("frame", json!(-1)));
+    starts(broken("params", json!([0, 0, 0, 0])));
+    starts(broken("params", json!([0, 0, 0, 0, 97.0, 8.1, 30])));
+    starts(broken("params", json!([1e39, 0, 0, 0, 47.0, 8.1, 30])));
+    starts(broken("params", json!([0, 0, 0, 0, 47.0, 8.1, null])));
+    starts(broken("type", json!("Surprise")));
+    assert!(broken("params", json!("x")).contains("line 1 column"));
+}
+
+#[test]
+fn fence_regions_that_cannot_be_used_are_errors_that_name_them() {
+    let ring = json!([[47, 8], [47, 8.1], [47.1, 8]]);
+    let polygon = |ring: Value| {
+        let good = json!({ "polygon": [[47, 8], [47, 8.1], [47.1, 8]], "inclusion": true });
+        fence_error(&json!({ "version": 2, "circles": [],
+            "polygons": [good, { "polygon": ring, "inclusion": false }] }))
+    };
+    for broken in [
+        json!([]),
+        json!([[47, 8], [47, 8.1]]),
+        json!([[47, 8], [47, 188], [47.1, 8]]),
+        json!([[47, 8], [47], [47.1, 8]]),
+    ] {
+        let error = polygon(broken);
+        assert!(error.starts_with("a.plan, geoFence polygon 2:"), "{error}");
+    }
+    for radius in [json!(0), json!(-1), json!(1e9)] {
+        let circle =
+            json!({ "circle": { "center": [47, 8], "radius": radius }, "inclusion": true });
+        let error = fence_error(&json!({ "version": 2, "polygons": [], "circles": [circle] }));
+        assert!(error.starts_with("a.plan, geoFence circle 1: the radius"), "{error}");
+    }
+    let error = fence_error(&json!({ "version": 3, "polygons": [], "circles": [] }));
+    assert!(error.contains("version 3"), "{error}");
+    // Whether it is an inclusion must be said: guessing wrong would turn the fence inside out.
+    let unsaid = fence_error(&json!({ "version": 2, "polygons": [{ "polygon": ring }] }));
+    assert!(unsaid.contains("missing field `inclusion`"), "{unsaid}");
+}
+
+#[test]
+fn a_plan_without_optional_parts_is_read() {
+    let scenario = read_scenario("a.plan", br#"{"fileType":"Plan"}"#).unwrap();
+    assert_eq!(scenario, Scenario::default());
+    let home = r#"{"fileType":"Plan","mission":{"plannedHomePosition":[null,null,null]}}"#;
+    assert_eq!(read_scenario("a.plan", home.as_bytes()).unwrap().mission.home, None);
+}
+
+#[test]
+fn the_first_fence_version_is_one_inclusion_polygon() {
+    let fence = json!({ "version": 1, "polygon": [[47, 8], [47, 8.1], [47.1, 8]] });
+    let scenario = read_scenario("a.plan", plan(&json!([]), &fence).as_bytes()).unwrap();
+    assert_eq!(scenario.fences.regions.len(), 1);
+    assert!(scenario.warnings[0].contains("version 1"));
+}

@@ -1,0 +1,140 @@
+//! Candidate paths for one leg (the paper's "Path Finding"): structurally different ones, which
+//! pass obstacles on different sides. Full enumeration is exponential; a bounded number of
+//! diverse candidates stands for it.
+
+use std::sync::atomic::AtomicBool;
+
+use geo::Line;
+use serde::Serialize;
+
+use super::grid::GridSearch;
+use super::leg_space::LegSpace;
+use super::polyline::{distance, length, turning};
+use super::search::{CornerPath, CornerSearch};
+use super::settings::Settings;
+use crate::geodesy::Xy;
+
+/// How near a barrier is to a ray that meets it, metres.
+const ON_THE_RAY: f64 = 1e-6;
+
+/// Where a candidate comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Source {
+    /// The straight line from start to goal, obstacles or not.
+    Straight,
+    /// The paper's grid.
+    Grid,
+    /// The corners of the buffered obstacles.
+    Corners,
+}
+
+/// A candidate path with its intrinsic properties.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// From start to goal, local metres.
+    pub points: Vec<Xy>,
+    /// What found it.
+    pub source: Source,
+    /// Euclidean length, metres.
+    pub length: f64,
+    /// Cumulative turning angle, radians.
+    pub turning: f64,
+    /// Whether every edge keeps the planning margin.
+    pub clear: bool,
+}
+
+impl Candidate {
+    fn new(points: Vec<Xy>, source: Source, space: &LegSpace<'_>) -> Self {
+        let clear = points.windows(2).all(|edge| space.is_clear(edge[0], edge[1]));
+        Self { length: length(&points), turning: turning(&points), points, source, clear }
+    }
+}
+
+/// The candidates of a leg: the shortest clear one first, the straight line last.
+///
+/// With [`super::settings::CandidateSource::Corners`] the shortest path over obstacle corners,
+/// then the best ones that are shut out of a gap of a better one; with `Grid` (the paper) paths
+/// over the grid only. As in the paper, the straight line is a candidate although it may collide.
+#[must_use]
+pub fn candidates(
+    space: &LegSpace<'_>,
+    start: Xy,
+    goal: Xy,
+    settings: &Settings,
+    cancelled: &AtomicBool,
+) -> Vec<Candidate> {
+    let mut found: Vec<Candidate> = Vec::new();
+    let wanted = settings.candidates.max(1);
+    if settings.source.uses_corners() {
+        let mut search = CornerSearch::new(*space, start, goal, cancelled);
+        for path in different_ways(&mut search, space, wanted) {
+            found.push(Candidate::new(path.points, Source::Corners, space));
+        }
+    }
+    if settings.source.uses_grid() || found.is_empty() {
+        let more = wanted.saturating_sub(found.len()).max(1);
+        let grid = GridSearch::new(space, start, goal, settings.grid, cancelled);
+        for points in grid.paths(more) {
+            found.push(Candidate::new(points, Source::Grid, space));
+        }
+    }
+    found.sort_by(|a, b| b.clear.cmp(&a.clear).then(a.length.total_cmp(&b.length)));
+    found.push(Candidate::new(vec![start, goal], Source::Straight, space));
+    found
+}
+
+/// The shortest path, and then for each gap that it takes the shortest one with that gap shut.
+fn different_ways(
+    search: &mut CornerSearch<'_>,
+    space: &LegSpace<'_>,
+    wanted: usize,
+) -> Vec<CornerPath> {
+    let Some(shortest) = search.shortest(&[]) else { return Vec::new() };
+    let mut ways = vec![shortest.clone()];
+    let mut gaps = gaps(&shortest, space);
+    // The narrowest gaps first: these are where passing on the other side is a different way.
+    gaps.sort_by(|a, b| line_length(a).total_cmp(&line_length(b)));
+    for gap in gaps {
+        if ways.len() >= wanted {
+            break;
+        }
+        if let Some(way) = search.shortest(&[gap])
+            && way.points.len() >= 2
+            && ways.iter().all(|known| known.points != way.points)
+        {
+            ways.push(way);
+        }
+    }
+    ways
+}
+
+/// The gaps between obstacles through which a path passes, one for each obstacle that it goes
+/// round: a line from the corner outwards to the next obstacle, or far out.
+fn gaps(path: &CornerPath, space: &LegSpace<'_>) -> Vec<Line> {
+    let far = length(&path.points);
+    let mut gaps = Vec::new();
+    let mut last_region = None;
+    for corner in &path.corners {
+        if last_region == Some(corner.region) {
+            continue;
+        }
+        last_region = Some(corner.region);
+        // With the boundary on the left of the tangent, outwards is to the right of it.
+        let outwards = Xy { x: corner.tangent.y, y: -corner.tangent.x };
+        let foot = corner.point - outwards * space.planning_margin();
+        let ray = Line::new(corner.point, corner.point + outwards * far);
+        let reach = space
+            .airspace()
+            .barriers()
+            .within(ray, ON_THE_RAY)
+            .filter_map(|(_, barrier)| barrier.first_hit(ray))
+            .fold(far, f64::min);
+        gaps.push(Line::new(foot, corner.point + outwards * reach));
+    }
+    gaps
+}
+
+fn line_length(line: &Line) -> f64 {
+    distance(line.start, line.end)
+}

@@ -1,0 +1,138 @@
+//! The finish: as few waypoints as needed, on the integers that the vehicle will fly, every edge
+//! judged once more against the unsimplified obstacles.
+
+use super::leg_space::LegSpace;
+use super::polyline::{cross, distance, length, turn};
+use crate::airspace::RegionId;
+use crate::geodesy::{LatLon, LatLonE7, LocalFrame, ProjectionError, Xy};
+
+/// What saving one waypoint may cost, as a share of the path's length.
+const WORTH_OF_A_WAYPOINT: f64 = 1.5e-4;
+
+/// Turns below this are no corner, radians.
+const NO_TURN: f64 = 1e-6;
+
+/// Removes what a path does not need: corners that can be cut, and pairs of corners that one
+/// can replace at next to no cost in length. Edges stay clear.
+#[must_use]
+pub fn with_few_corners(path: &[Xy], space: &LegSpace<'_>) -> Vec<Xy> {
+    let mut path = path.to_vec();
+    let allowance = WORTH_OF_A_WAYPOINT * length(&path);
+    loop {
+        let before = path.len();
+        cut_corners(&mut path, space);
+        merge_corners(&mut path, space, allowance);
+        if path.len() == before {
+            return path;
+        }
+    }
+}
+
+/// Drops every corner whose neighbours see each other: the path only gets shorter.
+fn cut_corners(path: &mut Vec<Xy>, space: &LegSpace<'_>) {
+    let mut i = 1;
+    while i + 1 < path.len() {
+        let straight = turn(path[i - 1], path[i], path[i + 1]).abs() < NO_TURN;
+        if straight || space.is_clear(path[i - 1], path[i + 1]) {
+            path.remove(i);
+            i = i.saturating_sub(1).max(1);
+        } else {
+            i += 1;
+        }
+    }
+}
+
+/// Replaces neighbouring corners that turn the same way by the point where their outer edges
+/// meet, where that is clear and costs no more than `allowance` metres.
+fn merge_corners(path: &mut Vec<Xy>, space: &LegSpace<'_>, allowance: f64) {
+    let mut i = 1;
+    while i + 2 < path.len() {
+        let [a, b, c, d] = [path[i - 1], path[i], path[i + 1], path[i + 2]];
+        if let Some(meeting) = meeting_point(a, b, c, d)
+            && distance(b, meeting) + distance(meeting, c) - distance(b, c) <= allowance
+            && space.is_clear(a, meeting)
+            && space.is_clear(meeting, d)
+        {
+            path[i] = meeting;
+            path.remove(i + 1);
+        } else {
+            i += 1;
+        }
+    }
+}
+
+/// Where the edge `a`-`b`, lengthened beyond `b`, meets `d`-`c`, lengthened beyond `c`.
+fn meeting_point(a: Xy, b: Xy, c: Xy, d: Xy) -> Option<Xy> {
+    let (u, v) = (b - a, c - d);
+    let parallel = cross(u, v);
+    if parallel.abs() < 1e-9 * distance(a, b) * distance(c, d) {
+        return None;
+    }
+    let t = cross(d - a, v) / parallel;
+    let s = cross(d - a, u) / parallel;
+    (t > 1.0 && s > 1.0).then(|| a + u * t)
+}
+
+/// A finished path: what the vehicle will fly.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finished {
+    /// The waypoints between start and goal.
+    pub waypoints: Vec<LatLonE7>,
+    /// The same with start and goal, as local points of the rounded positions.
+    pub points: Vec<Xy>,
+}
+
+/// Why a path cannot be finished.
+#[derive(Debug, thiserror::Error)]
+pub enum FinishError {
+    /// An edge that is really flown comes too near to a region.
+    #[error("an edge of the finished path is not clear")]
+    NotClear(RegionId),
+    /// A point is off the map.
+    #[error(transparent)]
+    Projection(#[from] ProjectionError),
+}
+
+/// Rounds a path to the integers that a vehicle stores, divides edges that are too long to be
+/// flown straight where something is near, and judges every edge.
+///
+/// # Errors
+/// [`FinishError::NotClear`] with the region that is in the way.
+pub fn finished(
+    path: &[Xy],
+    ends: (LatLon, LatLon),
+    frame: &LocalFrame,
+    space: &LegSpace<'_>,
+) -> Result<Finished, FinishError> {
+    let mut points = vec![frame.to_local(ends.0)?];
+    let mut waypoints = Vec::new();
+    for edge in path.windows(2) {
+        // A long edge is divided only where its deviation would matter.
+        let pieces = if space.flown_blocker(edge[0], edge[1]).is_none() {
+            1
+        } else {
+            (distance(edge[0], edge[1]) / space.longest_edge()).ceil().max(1.0) as u32
+        };
+        for piece in 1..=pieces {
+            let share = f64::from(piece) / f64::from(pieces);
+            let position = frame.to_position(edge[0] + (edge[1] - edge[0]) * share)?.to_e7();
+            waypoints.push(position);
+        }
+    }
+    waypoints.pop(); // the goal
+    for waypoint in &waypoints {
+        let position = waypoint.to_degrees().map_err(|_| ProjectionError::Inverse {
+            easting: f64::from(waypoint.lon),
+            northing: f64::from(waypoint.lat),
+            zone: frame.zone(),
+        })?;
+        points.push(frame.to_local(position)?);
+    }
+    points.push(frame.to_local(ends.1)?);
+    for edge in points.windows(2) {
+        if let Some(region) = space.flown_blocker(edge[0], edge[1]) {
+            return Err(FinishError::NotClear(region));
+        }
+    }
+    Ok(Finished { waypoints, points })
+}

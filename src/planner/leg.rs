@@ -1,0 +1,208 @@
+//! One leg from end to end: candidates, rounds, finish, and the reasons where there is no plan.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use super::candidates::{Candidate, candidates};
+use super::enclosure::enclosure;
+use super::finish::{FinishError, Finished, finished, with_few_corners};
+use super::leg_space::LegSpace;
+use super::polyline::distance;
+use super::rounds::{Contest, Round, RoundError};
+use super::settings::Settings;
+use super::trellis::EdgeJudge;
+use crate::airspace::RegionId;
+use crate::geodesy::{LatLon, LocalFrame, ProjectionError, Xy};
+use crate::qaoa::Qaoa;
+
+/// A leg to plan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LegRequest {
+    /// Where it starts.
+    pub from: LatLon,
+    /// Where it ends.
+    pub to: LatLon,
+    /// How far the vehicle may be from `from` when it sets out (a circle that it flies), metres.
+    pub from_reach: f64,
+    /// How far it may be from `to` when it arrives, metres.
+    pub to_reach: f64,
+}
+
+/// A planned leg, in the local frame where not said otherwise.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LegPlan {
+    /// The waypoints to insert, and the whole path.
+    pub finished: Finished,
+    /// What was compared: the first is where the rounds started from.
+    pub candidates: Vec<Candidate>,
+    /// The QAOA rounds.
+    pub rounds: Vec<Round>,
+    /// How long it took.
+    pub times: LegTimes,
+}
+
+/// Where the time of a leg went.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct LegTimes {
+    /// Looking for candidates.
+    pub candidates: Duration,
+    /// QAOA rounds, the judging of their edges included.
+    pub qaoa: Duration,
+    /// Finish.
+    pub finish: Duration,
+}
+
+/// What became of a leg.
+#[derive(Debug, Clone, PartialEq)]
+pub enum LegOutcome {
+    /// The straight line is clear: nothing to do.
+    Clear,
+    /// There is a new path.
+    Replanned(Box<LegPlan>),
+}
+
+/// Why there is no path.
+#[derive(Debug, thiserror::Error)]
+pub enum PlanError {
+    /// The start or the goal itself is too near to a region.
+    #[error("an end of the leg is too near to a region")]
+    EndNotClear {
+        /// Whether it is the goal.
+        goal: bool,
+        /// The region.
+        region: RegionId,
+        /// The distance to its edge, local metres; 0 inside.
+        clearance: f64,
+        /// What would be needed, local metres.
+        margin: f64,
+    },
+    /// Proven: start and goal are not connected.
+    #[error("no way exists")]
+    Infeasible {
+        /// Whether the goal is shut in (else the start).
+        goal: bool,
+        /// What shuts it in.
+        regions: Vec<RegionId>,
+    },
+    /// No clear path was found, and no proof that there is none.
+    #[error("no clear path was found")]
+    NotFound {
+        /// What was in the way last.
+        region: Option<RegionId>,
+    },
+    /// QAOA failed.
+    #[error(transparent)]
+    Round(#[from] RoundError),
+    /// A position cannot be projected.
+    #[error(transparent)]
+    Projection(#[from] ProjectionError),
+}
+
+/// Plans legs; keeps the QAOA engines from leg to leg.
+#[derive(Debug)]
+pub struct LegPlanner {
+    settings: Settings,
+    qaoa: Qaoa,
+}
+
+impl LegPlanner {
+    /// A planner with its settings.
+    #[must_use]
+    pub fn new(settings: Settings) -> Self {
+        let qaoa = Qaoa::new(settings.memory_limit);
+        Self { settings, qaoa }
+    }
+
+    /// The settings.
+    #[must_use]
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Plans one leg. `watch` is called after each round.
+    ///
+    /// # Errors
+    /// [`PlanError`] with the reason where there is no path.
+    pub fn plan(
+        &mut self,
+        request: &LegRequest,
+        frame: &LocalFrame,
+        space: &LegSpace<'_>,
+        cancelled: &AtomicBool,
+        watch: impl FnMut(&Round),
+    ) -> Result<LegOutcome, PlanError> {
+        let (start, goal) = (frame.to_local(request.from)?, frame.to_local(request.to)?);
+        end_is_clear(space, start, request.from_reach, false)?;
+        end_is_clear(space, goal, request.to_reach, true)?;
+        let reach = request.from_reach.max(request.to_reach);
+        let straight = distance(start, goal);
+        let needed = space.margin() + space.flown_deviation(straight) + reach;
+        if space.airspace().is_clear(start, goal, needed) {
+            return Ok(LegOutcome::Clear);
+        }
+
+        let began = Instant::now();
+        let found = candidates(space, start, goal, &self.settings, cancelled);
+        if cancelled.load(Ordering::Relaxed) {
+            return Err(RoundError::Cancelled.into());
+        }
+        let mut times = LegTimes { candidates: began.elapsed(), ..LegTimes::default() };
+        if !found.iter().any(|candidate| candidate.clear)
+            && let Some(proof) = enclosure(space, start, goal)
+        {
+            return Err(PlanError::Infeasible { goal: proof.goal, regions: proof.regions });
+        }
+
+        let began = Instant::now();
+        let judge = EdgeJudge {
+            space: *space,
+            lambda: self.settings.lambda.0,
+            safety_margin: self.settings.buffer.0.max(0.1),
+        };
+        let contest = Contest::new(&found[0], judge, &self.settings, &mut self.qaoa, cancelled);
+        let (path, rounds) = contest.run(&found[1..], watch)?;
+        times.qaoa = began.elapsed();
+
+        let began = Instant::now();
+        let path = with_few_corners(&path, space);
+        let finished = finished(&path, (request.from, request.to), frame, space).map_err(
+            |error| match error {
+                FinishError::NotClear(region) => PlanError::NotFound { region: Some(region) },
+                FinishError::Projection(cause) => cause.into(),
+            },
+        )?;
+        reaches_are_clear(request, space, &finished.points)?;
+        times.finish = began.elapsed();
+        Ok(LegOutcome::Replanned(Box::new(LegPlan { finished, candidates: found, rounds, times })))
+    }
+}
+
+/// Whether an end, with the circle flown around it, keeps the margin.
+fn end_is_clear(space: &LegSpace<'_>, end: Xy, reach: f64, goal: bool) -> Result<(), PlanError> {
+    let margin = space.margin() + reach;
+    match space.airspace().nearest(end, end, margin) {
+        None => Ok(()),
+        Some((clearance, region)) => {
+            Err(PlanError::EndNotClear { goal, region, clearance, margin })
+        }
+    }
+}
+
+/// The first and the last edge are flown from and to anywhere on the circles at the ends.
+fn reaches_are_clear(
+    request: &LegRequest,
+    space: &LegSpace<'_>,
+    points: &[Xy],
+) -> Result<(), PlanError> {
+    let n = points.len();
+    let ends = [
+        (request.from_reach, points[0], points[1]),
+        (request.to_reach, points[n - 2], points[n - 1]),
+    ];
+    for (reach, a, b) in ends.into_iter().filter(|(reach, ..)| *reach > 0.0) {
+        if let Some(region) = space.airspace().blocker(a, b, space.margin() + reach) {
+            return Err(PlanError::NotFound { region: Some(region) });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,36 @@
+//! QUAV's planner for one leg: candidates, QAOA rounds, finish.
+//!
+//! In reading order:
+//! - [`settings`]: the paper's table of settings and what may be changed;
+//! - [`leg_space`]: the airspace with the leg's margins;
+//! - [`polyline`]: lengths, turns, simplification;
+//! - [`corners`], [`search`]: shortest paths over the corners of obstacles;
+//! - [`grid`]: the paper's candidate grid;
+//! - [`candidates`]: structurally different candidates from both;
+//! - [`stations`]: segmentation into one edge a qubit;
+//! - [`trellis`]: two polylines as an Ising chain;
+//! - [`moves`]: challengers for refinement;
+//! - [`rounds`]: QAOA decides, round after round;
+//! - [`finish`]: few waypoints, on the integers that the vehicle flies;
+//! - [`enclosure`]: proof that there is no way;
+//! - [`leg`]: all of it for one leg.
+//!
+//! No I/O and no clock but for the timings in the result.
+
+pub mod candidates;
+pub mod corners;
+pub mod enclosure;
+pub mod finish;
+pub mod grid;
+pub mod leg;
+pub mod leg_space;
+pub mod moves;
+pub mod polyline;
+pub mod rounds;
+pub mod search;
+pub mod settings;
+pub mod stations;
+pub mod trellis;
+
+pub use leg::{LegOutcome, LegPlan, LegPlanner, PlanError};
+pub use settings::{CandidateSource, Rounds, Settings};

@@ -1,0 +1,130 @@
+//! Training: Adam on ⟨H⟩ with exact gradients, stopped early where the loss has settled.
+
+use super::adam::Adam;
+use super::angles::Angles;
+use super::engine::{Engine, EngineError};
+
+/// How a circuit is trained. Losses are in the units of the engine's (scaled) problem.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrainSettings {
+    /// The most Adam steps taken.
+    pub steps: usize,
+    /// Adam's step size, radians.
+    pub learning_rate: f64,
+    /// When to stop before `steps`; `None` takes them all.
+    pub settled: Option<Settled>,
+}
+
+/// The loss has settled once `window` steps in a row have not lowered it by more than `tolerance`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settled {
+    /// Steps to wait for an improvement.
+    pub window: usize,
+    /// Improvement that counts, in units of the scaled problem (its standard deviation is 1).
+    pub tolerance: f64,
+}
+
+impl Default for TrainSettings {
+    /// The paper's settings: 60 steps at 0.1, all of them.
+    fn default() -> Self {
+        Self { steps: 60, learning_rate: 0.1, settled: None }
+    }
+}
+
+/// The outcome of a training.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Training {
+    /// The angles with the lowest loss that was seen.
+    pub angles: Angles,
+    /// The loss at those angles.
+    pub expectation: f64,
+    /// ⟨H⟩ at the start and after each step taken.
+    pub loss: Vec<f64>,
+}
+
+/// Trains from `start`.
+///
+/// # Errors
+/// Whatever the engine cannot do with a circuit of that many layers.
+pub fn train(
+    engine: &mut dyn Engine,
+    start: Angles,
+    settings: &TrainSettings,
+) -> Result<Training, EngineError> {
+    let mut adam = Adam::new(settings.learning_rate, start.layers());
+    let mut angles = start.clone();
+    let mut best = Training { angles: start, expectation: f64::INFINITY, loss: Vec::new() };
+    let mut settled_at = f64::INFINITY;
+    let mut waited = 0;
+    loop {
+        let finished = best.loss.len() == settings.steps;
+        let (loss, gradient) = if finished {
+            (engine.expectation(&angles)?, None)
+        } else {
+            let (loss, gradient) = engine.expectation_and_gradient(&angles)?;
+            (loss, Some(gradient))
+        };
+        best.loss.push(loss);
+        if loss < best.expectation || best.loss.len() == 1 {
+            best.expectation = loss;
+            best.angles.clone_from(&angles);
+        }
+        if let Some(Settled { window, tolerance }) = settings.settled {
+            if loss < settled_at - tolerance {
+                settled_at = loss;
+                waited = 0;
+            } else {
+                waited += 1;
+            }
+            if waited >= window.max(1) {
+                return Ok(best);
+            }
+        }
+        match gradient {
+            Some(gradient) => adam.step(&mut angles, &gradient),
+            None => return Ok(best),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::chain::ChainEngine;
+    use super::super::ising::ChainIsing;
+    use super::*;
+
+    fn engine() -> ChainEngine {
+        let chain = ChainIsing::new(0.0, vec![0.4, -0.5, 0.2, 0.1], vec![0.5, -0.3, 0.4]).unwrap();
+        ChainEngine::new(chain, 1 << 30)
+    }
+
+    #[test]
+    fn training_lowers_the_loss_and_keeps_the_whole_curve() {
+        let training = train(&mut engine(), Angles::ramp(3), &TrainSettings::default()).unwrap();
+        assert_eq!(training.loss.len(), 61);
+        assert!(training.expectation < training.loss[0] - 0.1);
+        let lowest = training.loss.iter().copied().fold(f64::INFINITY, f64::min);
+        assert_eq!(training.expectation, lowest);
+        assert_eq!(engine().expectation(&training.angles).unwrap(), lowest);
+    }
+
+    #[test]
+    fn carried_over_angles_settle_in_fewer_steps_and_never_end_worse() {
+        let first = train(&mut engine(), Angles::ramp(3), &TrainSettings::default()).unwrap();
+        let settings = TrainSettings {
+            settled: Some(Settled { window: 3, tolerance: 1e-2 }),
+            ..TrainSettings::default()
+        };
+        let second = train(&mut engine(), first.angles.clone(), &settings).unwrap();
+        assert!(second.loss.len() < 20);
+        assert!(second.expectation <= first.expectation + 1e-12);
+    }
+
+    #[test]
+    fn no_steps_at_all_only_evaluates_the_start() {
+        let settings = TrainSettings { steps: 0, ..TrainSettings::default() };
+        let training = train(&mut engine(), Angles::ramp(2), &settings).unwrap();
+        assert_eq!(training.loss, [training.expectation]);
+        assert_eq!(training.angles, Angles::ramp(2));
+    }
+}

@@ -1,0 +1,18 @@
+//! What is said and shown about a plan or a judgement: values in, text out.
+//!
+//! - [`run`]: what a command knows about its run besides the outcome;
+//! - [`stretch`]: each leg of the original mission with what is now flown for it;
+//! - [`json`]: the documents of `--json`;
+//! - [`summary`]: the same for people, on a terminal of 80 columns;
+//! - [`picture`]: the map with obstacles, candidates, old and new route, and the loss curve, as SVG.
+//!
+//! Nothing here plans, judges or does I/O.
+
+pub mod json;
+pub mod picture;
+pub mod run;
+pub mod stretch;
+pub mod summary;
+mod text;
+
+pub use run::Run;

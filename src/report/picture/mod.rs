@@ -1,0 +1,138 @@
+//! The picture of a plan: one self-contained SVG on white, for browsers, README files and print.
+//!
+//! - [`scene`]: what is drawn, in the local metres of one zone;
+//! - [`view`]: from local metres to the page;
+//! - [`map`]: obstacles, buffers, fences, candidates, old and new route;
+//! - [`places`]: the numbered waypoints, start and goal;
+//! - [`chart`]: axes and curves; [`training`]: the two charts of the QAOA rounds;
+//! - [`legend`]: what the colours mean.
+//!
+//! A mission over several zones is drawn for the zone with the most legs.
+
+mod chart;
+mod legend;
+mod map;
+mod places;
+mod scene;
+mod training;
+mod view;
+
+use svg::Document;
+use svg::node::element::{Group, Rectangle, Style, Text};
+
+use super::run::Run;
+use super::text::{change, clearance, count, plain};
+use crate::geodesy::ProjectionError;
+use crate::replan::Replanned;
+use scene::Scene;
+use view::{Rect, View};
+
+/// The page, in pixels: width, border, and gap between panels.
+const PAGE: f64 = 1200.0;
+const BORDER: f64 = 20.0;
+const GAP: f64 = 24.0;
+
+/// The height of the title, and of the charts below the map.
+const HEAD: f64 = 66.0;
+const CHARTS: f64 = 250.0;
+
+/// The least and the most height of the map.
+const MAP_HEIGHT: (f64, f64) = (420.0, 900.0);
+
+/// The look of everything: classes keep the file small.
+const STYLE: &str = "\
+text{font:13px 'Segoe UI',Roboto,Helvetica,Arial,sans-serif;fill:#2b3440}\
+.title{font-size:22px;font-weight:600}.sub{font-size:14px;fill:#52606d}\
+.small{font-size:11.5px;fill:#52606d}.head{font-weight:600}\
+.panel{fill:#f8f7f3}.frame{fill:none;stroke:#c3c8ce}\
+.obstacle{fill:#8b95a1;stroke:#5c6773;stroke-width:.8;stroke-linejoin:round}\
+.rim{fill:#dd8b1d;stroke:#dd8b1d;stroke-linejoin:round}\
+.buffer{fill:#fbe3bd;stroke:#fbe3bd;stroke-linejoin:round}\
+.outside{fill:#d9dde2;fill-rule:evenodd}\
+.fence{fill:none;stroke:#2f7d4f;stroke-width:2}\
+.route{fill:none;stroke-width:2;stroke-linejoin:round;stroke-opacity:.9}\
+.corners{stroke:#8e44ad}.grid{stroke:#0e9aa7}\
+.old{fill:none;stroke:#d1242f;stroke-width:2.4;stroke-dasharray:9 6}\
+.casing{fill:none;stroke:#fff;stroke-width:7;stroke-linecap:round;stroke-linejoin:round}\
+.new{fill:none;stroke:#1257c0;stroke-width:3.4;stroke-linecap:round;stroke-linejoin:round}\
+.circle{fill:none;stroke:#1257c0;stroke-width:1.2;stroke-dasharray:3 3}\
+.item{fill:#1257c0;stroke:#fff;stroke-width:1.5}\
+.inserted{fill:#fff;stroke:#1257c0;stroke-width:2}\
+.start{fill:#1a9850;stroke:#fff;stroke-width:2}\
+.goal{fill:#fff;stroke:#1b1f24;stroke-width:3}.bull{fill:#1b1f24}\
+.number{font-size:12px;font-weight:600;fill:#0b3d91;stroke:#fff;stroke-width:3.5;\
+stroke-linejoin:round;paint-order:stroke;text-anchor:middle}\
+.ink{fill:#2b3440}.plate{fill:#fff;fill-opacity:.88}\
+.axis{stroke:#9aa3ad}.tick{stroke:#e3e6ea}.later{fill:none;stroke:#7d92ad;stroke-opacity:.5}\
+.first{fill:none;stroke-width:2.6;stroke-linejoin:round}\
+.middle{text-anchor:middle}.end{text-anchor:end}";
+
+/// Draws a plan.
+///
+/// # Errors
+/// [`ProjectionError`] where a place of the mission cannot be projected into the drawn zone.
+pub fn picture(result: &Replanned, run: &Run<'_>, title: &str) -> Result<String, ProjectionError> {
+    let scene = Scene::new(result)?;
+    let (low, high) = scene.extent();
+    let width = PAGE - 2.0 * BORDER;
+    let (least, most) = MAP_HEIGHT;
+    let height = (width * (high.y - low.y) / (high.x - low.x)).clamp(least, most).round();
+    let panel = Rect { x: BORDER, y: BORDER + HEAD, width, height };
+    let view = View::new(panel, low, high);
+
+    let charts = panel.y + panel.height + GAP;
+    let page_height = charts + CHARTS + BORDER;
+    let losses = Rect { x: BORDER, y: charts, width: 500.0, height: CHARTS };
+    let lengths = Rect { x: losses.right() + GAP, width: 330.0, ..losses };
+    let key =
+        Rect { x: lengths.right() + GAP, width: PAGE - BORDER - GAP - lengths.right(), ..losses };
+    let document = Document::new()
+        .set("viewBox", (0, 0, PAGE as i32, page_height as i32))
+        .set("width", PAGE as i32)
+        .set("height", page_height as i32)
+        .add(Style::new(STYLE))
+        .add(Rectangle::new().set("width", "100%").set("height", "100%").set("fill", "#fff"))
+        .add(header(result, run, title))
+        .add(map::map(&scene, &view))
+        .add(training::losses(&scene.records, losses))
+        .add(training::lengths(&scene.records, lengths))
+        .add(legend::legend(&scene, run, key));
+    Ok(format!("{document}\n"))
+}
+
+/// The title and the figures before and after.
+fn header(result: &Replanned, run: &Run<'_>, title: &str) -> Group {
+    let (before, after) = (&result.before, &result.after);
+    let buffer = run.options.settings.buffer;
+    let figures = if result.is_changed() {
+        format!(
+            "length {:.1} \u{2192} {:.1} ({})   \u{b7}   clearance {} \u{2192} {}   \u{b7}   \
+             {}   \u{b7}   buffer {buffer}   \u{b7}   seed {}",
+            before.length(),
+            after.length(),
+            change(before.length(), after.length()),
+            clearance(before.clearance()),
+            clearance(after.clearance()),
+            count(result.inserted.len(), "new waypoint"),
+            run.options.settings.seed,
+        )
+    } else {
+        format!(
+            "nothing to re-plan   \u{b7}   length {:.1}   \u{b7}   clearance {}   \u{b7}   \
+             buffer {buffer}",
+            after.length(),
+            clearance(after.clearance()),
+        )
+    };
+    Group::new().add(text(BORDER, BORDER + 24.0, "title", &plain(title))).add(text(
+        BORDER,
+        BORDER + 48.0,
+        "sub",
+        &figures,
+    ))
+}
+
+/// A line of text.
+fn text(x: f64, y: f64, class: &str, content: &str) -> Text {
+    Text::new(content).set("x", view::px(x)).set("y", view::px(y)).set("class", class)
+}

@@ -1,0 +1,240 @@
+//! What is drawn, in the local metres of the zone with the most legs.
+
+use geo::MultiPolygon;
+
+use crate::airspace::Outline;
+use crate::geodesy::{LocalFrame, ProjectionError, Xy, Zone};
+use crate::mission::Leg;
+use crate::mission::legs::{LegKind, number as item_number};
+use crate::planner::candidates::Source;
+use crate::replan::{Field, LegRecord, Replanned, Verdict};
+
+/// The share of the route's extent that is shown around it.
+const AROUND: f64 = 0.06;
+
+/// An inclusion is shown whole where it is at most this many times as wide and high as the route.
+const FENCE_SHOWN: f64 = 1.6;
+
+/// A straight leg.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Edge {
+    pub(super) from: Xy,
+    pub(super) to: Xy,
+}
+
+/// What a place of the new mission is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Role {
+    /// An item of the original.
+    Item,
+    /// A waypoint that was inserted.
+    Inserted,
+}
+
+/// A place of the new mission.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Place {
+    pub(super) at: Xy,
+    /// The item's number as ground stations count; `None`: home, a rally point or the start.
+    pub(super) number: Option<usize>,
+    pub(super) role: Role,
+    /// Radius of the circle that is flown around it, metres.
+    pub(super) circle: f64,
+    /// The least clearance of the leg that ends here, metres.
+    pub(super) clearance: Option<f64>,
+}
+
+/// Everything on the map.
+#[derive(Debug)]
+pub(super) struct Scene<'a> {
+    pub(super) outlines: &'a [Outline],
+    pub(super) union: Option<&'a MultiPolygon>,
+    pub(super) margin: f64,
+    pub(super) old: Vec<Edge>,
+    pub(super) new: Vec<Edge>,
+    /// The legs planned in this zone.
+    pub(super) records: Vec<&'a LegRecord>,
+    pub(super) places: Vec<Place>,
+    pub(super) start: Option<Xy>,
+    pub(super) goal: Option<Xy>,
+}
+
+impl<'a> Scene<'a> {
+    pub(super) fn new(result: &'a Replanned) -> Result<Self, ProjectionError> {
+        let mut scene = Self {
+            outlines: &[],
+            union: None,
+            margin: 0.0,
+            old: Vec::new(),
+            new: Vec::new(),
+            records: Vec::new(),
+            places: Vec::new(),
+            start: None,
+            goal: None,
+        };
+        let Some(field) = main_field(result) else { return Ok(scene) };
+        let frame = LocalFrame::new(field.zone, field.origin)?;
+        let only = result.fields.len() == 1;
+        let is_here = |leg: &Leg| leg.kind != LegKind::Stay && (only || zone_of(leg) == field.zone);
+        let edges = |verdict: &Verdict| {
+            let legs = verdict.legs.iter().map(|verdict| &verdict.leg).filter(|leg| is_here(leg));
+            legs.map(|leg| edge(leg, &frame)).collect::<Result<Vec<_>, _>>()
+        };
+        scene.outlines = &field.outlines;
+        scene.union = field.union.as_ref();
+        scene.margin = field.margin;
+        scene.old = edges(&result.before)?;
+        scene.new = edges(&result.after)?;
+        scene.records = result.legs.iter().filter(|record| record.zone == field.zone).collect();
+        scene.places = places(result, &frame, is_here)?;
+        let way = result.after.places();
+        let end = |place: Option<&crate::geodesy::LatLon>| {
+            place.map(|&place| frame.to_local(place)).transpose()
+        };
+        (scene.start, scene.goal) = (end(way.first())?, end(way.last())?);
+        Ok(scene)
+    }
+
+    /// Candidates besides the straight lines.
+    pub(super) fn candidates(&self, source: Source) -> impl Iterator<Item = &'a [Xy]> + '_ {
+        let all = self.records.iter().flat_map(|record| &record.candidates);
+        all.filter(move |candidate| candidate.source == source).map(|c| c.points.as_slice())
+    }
+
+    /// Whether anything is forbidden by an inclusion.
+    pub(super) fn has_inclusion(&self) -> bool {
+        self.union.is_some() || self.zones().next().is_some()
+    }
+
+    fn zones(&self) -> impl Iterator<Item = &'a Outline> + '_ {
+        let is_zone = |o: &&Outline| matches!(o, Outline::Zone(_) | Outline::ZoneDisc { .. });
+        self.outlines.iter().filter(is_zone)
+    }
+
+    /// The corners of what has to be seen, never without area.
+    pub(super) fn extent(&self) -> (Xy, Xy) {
+        let mut extent = Extent::default();
+        for edge in self.old.iter().chain(&self.new) {
+            extent.add(edge.from);
+            extent.add(edge.to);
+        }
+        for source in [Source::Corners, Source::Grid] {
+            self.candidates(source).flatten().for_each(|&point| extent.add(point));
+        }
+        for place in self.places.iter().filter(|place| place.circle > 0.0) {
+            let reach = Xy { x: place.circle, y: place.circle };
+            extent.add(place.at - reach);
+            extent.add(place.at + reach);
+        }
+        let route = extent.grown(2.0 * self.margin);
+        let mut whole = route;
+        for zone in self.zones() {
+            match zone {
+                Outline::Zone(ring) => ring.iter().for_each(|&point| whole.add(point)),
+                Outline::ZoneDisc { centre, radius } => {
+                    whole.add(*centre - Xy { x: *radius, y: *radius });
+                    whole.add(*centre + Xy { x: *radius, y: *radius });
+                }
+                Outline::Solid(_) | Outline::SolidDisc { .. } => {}
+            }
+        }
+        let (shown, is_whole) = (route.size(), whole.size());
+        let longer = shown.x.max(shown.y);
+        let fits = is_whole.x.max(is_whole.y) <= FENCE_SHOWN * longer;
+        let chosen = if fits { whole } else { route };
+        let size = chosen.size();
+        let chosen = chosen.grown(AROUND * size.x.max(size.y));
+        (chosen.low, chosen.high)
+    }
+}
+
+/// A bounding box.
+#[derive(Debug, Clone, Copy)]
+struct Extent {
+    low: Xy,
+    high: Xy,
+}
+
+impl Default for Extent {
+    fn default() -> Self {
+        let far = f64::INFINITY;
+        Self { low: Xy { x: far, y: far }, high: Xy { x: -far, y: -far } }
+    }
+}
+
+impl Extent {
+    fn add(&mut self, point: Xy) {
+        self.low = Xy { x: self.low.x.min(point.x), y: self.low.y.min(point.y) };
+        self.high = Xy { x: self.high.x.max(point.x), y: self.high.y.max(point.y) };
+    }
+
+    fn size(&self) -> Xy {
+        self.high - self.low
+    }
+
+    /// With some metres around it, at least 10 m; around the origin where it is empty.
+    fn grown(self, around: f64) -> Self {
+        let around = around.max(10.0);
+        let by = Xy { x: around, y: around };
+        if self.low.x > self.high.x {
+            return Self { low: -by, high: by };
+        }
+        Self { low: self.low - by, high: self.high + by }
+    }
+}
+
+/// The field with the most legs.
+fn main_field(result: &Replanned) -> Option<&Field> {
+    let legs = |field: &&Field| {
+        result.before.legs.iter().filter(|verdict| zone_of(&verdict.leg) == field.zone).count()
+    };
+    result.fields.iter().max_by_key(legs)
+}
+
+fn zone_of(leg: &Leg) -> Zone {
+    Zone::of_leg(leg.from.position, leg.to.position)
+}
+
+fn edge(leg: &Leg, frame: &LocalFrame) -> Result<Edge, ProjectionError> {
+    let (from, to) = (frame.to_local(leg.from.position)?, frame.to_local(leg.to.position)?);
+    Ok(Edge { from, to })
+}
+
+/// Where the legs of the new mission end, and where the first one starts.
+fn places(
+    result: &Replanned,
+    frame: &LocalFrame,
+    is_here: impl Fn(&Leg) -> bool,
+) -> Result<Vec<Place>, ProjectionError> {
+    let mut places: Vec<Place> = Vec::new();
+    let mut add = |place: Place| {
+        let same = |known: &&mut Place| known.at == place.at && known.number == place.number;
+        match places.iter_mut().find(same) {
+            Some(known) => {
+                known.circle = known.circle.max(place.circle);
+                known.clearance =
+                    [known.clearance, place.clearance].into_iter().flatten().reduce(f64::min);
+            }
+            None => places.push(place),
+        }
+    };
+    for (k, verdict) in result.after.legs.iter().filter(|v| is_here(&v.leg)).enumerate() {
+        let leg = &verdict.leg;
+        if k == 0 {
+            // A start that is an item's place: the mission begins there.
+            let number = leg.from.item.map(item_number);
+            let (at, circle) = (frame.to_local(leg.from.position)?, leg.from.circle.0);
+            add(Place { at, number, role: Role::Item, circle, clearance: None });
+        }
+        let item = match leg.kind {
+            LegKind::Return(_) => None,
+            _ => leg.to.item,
+        };
+        let inserted = item.is_some_and(|item| result.inserted.binary_search(&item).is_ok());
+        let role = if inserted { Role::Inserted } else { Role::Item };
+        let (at, circle) = (frame.to_local(leg.to.position)?, leg.to.circle.0);
+        let clearance = verdict.clearance.0.is_finite().then_some(verdict.clearance.0);
+        add(Place { at, number: item.map(item_number), role, circle, clearance });
+    }
+    Ok(places)
+}

@@ -1,0 +1,237 @@
+//! The program itself against the fake vehicle: what arrives is judged by `sitl/judge.py`, which
+//! shares no code with quavd.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use quav::mission::MissionType;
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+use crate::sitl::{FakeVehicle, PERSONAS, python};
+
+/// The scenarios with their exact shortest lengths, metres: bracketed from both sides to 1 cm by
+/// a solver that is not part of quavd.
+const SCENARIOS: [(&str, f64); 6] = [
+    ("s1", 804.47),
+    ("s2", 583.33),
+    ("s3", 351.66),
+    ("s4", 465.75),
+    ("s5", 354.07),
+    ("s6", 632.90),
+];
+
+fn root(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
+}
+
+fn example(name: &str) -> String {
+    root(&format!("fence_examples/{name}.plan")).to_string_lossy().into_owned()
+}
+
+fn quavd(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_quavd")).args(arguments).output().unwrap()
+}
+
+/// A vehicle with a scenario, and a directory for records.
+struct Field {
+    vehicle: FakeVehicle,
+    state: TempDir,
+}
+
+impl Field {
+    fn new(link: &str, persona: &str, scenario: &str) -> Self {
+        let plan = example(scenario);
+        let vehicle = FakeVehicle::start_on(link, &["--persona", persona, "--mission", &plan]);
+        Self { vehicle, state: tempfile::tempdir().unwrap() }
+    }
+
+    fn once(&self, more: &[&str]) -> Output {
+        let url = self.vehicle.endpoint().to_string();
+        let state = self.state.path().to_string_lossy().into_owned();
+        let mut arguments = vec!["once", "--connect", &url, "--state-dir", &state, "--system", "1"];
+        arguments.extend(more);
+        quavd(&arguments)
+    }
+
+    /// What the vehicle holds, by the measure of `judge.py`.
+    fn judged(&mut self) -> Value {
+        let dump = self.state.path().join("dump.json");
+        std::fs::write(&dump, self.vehicle.dump().to_string()).unwrap();
+        let output = Command::new(python()).arg(root("sitl/judge.py")).arg(&dump).output().unwrap();
+        serde_json::from_slice(&output.stdout)
+            .unwrap_or_else(|_| panic!("{}", String::from_utf8_lossy(&output.stderr)))
+    }
+}
+
+fn stdout_json(output: &Output) -> Value {
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|error| {
+        panic!(
+            "{error}: {}\n{}",
+            String::from_utf8_lossy(&output.stdout),
+            String::from_utf8_lossy(&output.stderr)
+        )
+    })
+}
+
+fn all_six_over(link: &str, persona: &str) {
+    for (name, exact) in SCENARIOS {
+        let mut field = Field::new(link, persona, name);
+        let output = field.once(&["--json"]);
+        let what = format!("{name} {persona} {link}");
+        assert_eq!(
+            output.status.code(),
+            Some(0),
+            "{what}: {}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        let verdict = field.judged();
+        assert_eq!(verdict["collisions"], 0, "{what}: {verdict}");
+        assert!(verdict["min_clearance_m"].as_f64().unwrap() >= 4.99, "{what}: {verdict}");
+        assert!(verdict["length_m"].as_f64().unwrap() <= 1.05 * exact, "{what}: {verdict}");
+        // What was said is what is there.
+        let said = stdout_json(&output);
+        let length = said["length_m"].as_f64().unwrap();
+        assert!((length - verdict["length_m"].as_f64().unwrap()).abs() < 0.05, "{what}: {said}");
+        assert_eq!(said["vehicle"]["uploaded"], true);
+        assert_eq!(said["vehicle"]["verified"], true);
+    }
+}
+
+macro_rules! all_six {
+    ($($name:ident: $link:expr, $persona:expr;)*) => {$(
+        #[test]
+        fn $name() {
+            all_six_over($link, $persona);
+        }
+    )*};
+}
+
+all_six! {
+    the_six_scenarios_arrive_on_ardupilot_over_udp: "udpin:127.0.0.1:0", "ardupilot";
+    the_six_scenarios_arrive_on_ardupilot_over_tcp: "tcpin:127.0.0.1:0", "ardupilot";
+    the_six_scenarios_arrive_on_ardupilot_over_a_serial_line: "pty", "ardupilot";
+    the_six_scenarios_arrive_on_px4_over_udp: "udpin:127.0.0.1:0", "px4";
+    the_six_scenarios_arrive_on_px4_over_tcp: "tcpin:127.0.0.1:0", "px4";
+    the_six_scenarios_arrive_on_px4_over_a_serial_line: "pty", "px4";
+}
+
+#[test]
+fn plan_and_once_give_the_same_waypoints_for_the_same_seed() {
+    for (name, _) in SCENARIOS {
+        let field = Field::new("udpin:127.0.0.1:0", "ardupilot", name);
+        let once = stdout_json(&field.once(&["--json", "--dry-run", "--seed", "7"]));
+        let plan = stdout_json(&quavd(&["plan", &example(name), "--json", "--seed", "7"]));
+        assert!(once["waypoints"].as_array().unwrap().len() > 2);
+        assert_eq!(once["waypoints"], plan["waypoints"], "{name}");
+    }
+}
+
+#[test]
+fn planning_the_same_mission_again_writes_nothing() {
+    for persona in PERSONAS {
+        let mut field = Field::new("udpin:127.0.0.1:0", persona, "s5");
+        assert_eq!(field.once(&[]).status.code(), Some(0));
+        let after_first = field.vehicle.dump();
+        let again = stdout_json(&field.once(&["--json"]));
+        assert_eq!(again["vehicle"]["uploaded"], false);
+        assert_eq!(again["vehicle"]["verified"], true);
+        let after_second = field.vehicle.dump();
+        assert_eq!(after_first["mission"], after_second["mission"]);
+        assert_eq!(after_first["uploads"], after_second["uploads"]);
+    }
+}
+
+#[test]
+fn an_infeasible_scenario_ends_with_3_and_leaves_the_vehicle_alone() {
+    for persona in PERSONAS {
+        let mut field = Field::new("udpin:127.0.0.1:0", persona, "infeasible");
+        let before = field.vehicle.dump();
+        let output = field.once(&["--json"]);
+        assert_eq!(output.status.code(), Some(3));
+        let said = stdout_json(&output);
+        assert_eq!(said["feasible"], false);
+        assert!(said["reason"].as_str().unwrap().contains("no safe path"), "{said}");
+        let after = field.vehicle.dump();
+        assert_eq!(before["mission"], after["mission"]);
+        assert_eq!(after["uploads"].as_array().unwrap().len(), 0);
+    }
+}
+
+#[test]
+fn a_vehicle_lost_in_mid_upload_ends_with_4_and_restore_puts_the_original_back() {
+    for persona in PERSONAS {
+        let mut field = Field::new("udpin:127.0.0.1:0", persona, "s5");
+        let before = field.vehicle.dump()["mission"]["items"].clone();
+        field.vehicle.fault("vanish:item=2,type=mission,when=upload");
+        let output = field.once(&[]);
+        assert_eq!(output.status.code(), Some(4), "{}", String::from_utf8_lossy(&output.stderr));
+        // It comes back with what its storage held: half a mission on ArduPilot.
+        let mut left = field.vehicle.held(MissionType::Mission);
+        assert_eq!(persona == "px4", json!(left) == before, "{left:?}");
+        left.drain(..usize::from(persona == "ardupilot"));
+        field.vehicle = FakeVehicle::start(&["--persona", persona, "--mission", &example("s5")]);
+        field.vehicle.control(&json!({"cmd": "set", "mission": left}));
+        let output = field.once(&["--restore"]);
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        assert_eq!(field.vehicle.dump()["mission"]["items"], before, "{persona}");
+    }
+}
+
+#[test]
+fn an_armed_vehicle_is_refused_with_5() {
+    let mut field = Field::new("udpin:127.0.0.1:0", "ardupilot", "s5");
+    field.vehicle.control(&json!({"cmd": "set", "armed": true}));
+    let before = field.vehicle.dump()["mission"].clone();
+    let output = field.once(&[]);
+    assert_eq!(output.status.code(), Some(5), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(field.vehicle.dump()["mission"], before);
+}
+
+#[test]
+fn nobody_there_ends_with_4_and_a_bad_option_with_2() {
+    let silent = ["once", "--connect", "udpin:127.0.0.1:0", "--wait", "1"];
+    let state = tempfile::tempdir().unwrap();
+    let state = state.path().to_string_lossy().into_owned();
+    let output = quavd(&[&silent[..], &["--state-dir", &state]].concat());
+    assert_eq!(output.status.code(), Some(4));
+    assert_eq!(quavd(&["once", "--connect", "carrier-pigeon:1"]).status.code(), Some(2));
+    assert_eq!(quavd(&["plan", "no-such-file.plan"]).status.code(), Some(2));
+    assert_eq!(quavd(&["plan", &example("s1"), "--buffer", "-1"]).status.code(), Some(2));
+}
+
+#[test]
+fn check_finds_the_collision_in_the_original_and_none_in_the_plan() {
+    let directory = tempfile::tempdir().unwrap();
+    let planned = directory.path().join("planned.waypoints").to_string_lossy().into_owned();
+    let picture = directory.path().join("planned.svg").to_string_lossy().into_owned();
+    let output = quavd(&["plan", &example("s4"), "--out", &planned, "--out", &picture]);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(std::fs::read_to_string(&picture).unwrap().starts_with("<svg"));
+
+    let before = quavd(&["check", &example("s4"), "--json"]);
+    assert_eq!(before.status.code(), Some(3));
+    assert_eq!(stdout_json(&before)["collision_free"], false);
+    let after = quavd(&["check", &example("s4"), &planned, "--json"]);
+    assert_eq!(after.status.code(), Some(0), "{}", String::from_utf8_lossy(&after.stderr));
+    assert!(stdout_json(&after)["min_clearance_m"].as_f64().unwrap() >= 5.0);
+}
+
+#[test]
+fn every_example_plans_or_says_why_not() {
+    let mut plans = 0;
+    for entry in std::fs::read_dir(root("fence_examples")).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|suffix| suffix != "plan") {
+            continue;
+        }
+        plans += 1;
+        let infeasible = path.file_stem().unwrap() == "infeasible";
+        let output = quavd(&["plan", &path.to_string_lossy(), "--json"]);
+        let expected = if infeasible { 3 } else { 0 };
+        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(expected), "{}: {errors}", path.display());
+        assert_eq!(stdout_json(&output)["feasible"], !infeasible);
+    }
+    assert!(plans >= 11);
+}
