@@ -223,7 +223,7 @@ impl Run {
 #[tokio::test]
 async fn whatever_happens_the_vehicle_holds_the_new_mission_or_the_old_one() {
     let first = from_environment("QUAV_FAULT_SEED", 1);
-    for seed in first..first + from_environment("QUAV_FAULT_RUNS", 8) {
+    for seed in first..first + from_environment("QUAV_FAULT_RUNS", 6) {
         let run = Run::from_seed(seed);
         let Run { persona, faults, dies_at, old, new } = &run;
         println!("seed {seed}: {persona}, {old} -> {new} items, dies at {dies_at:?}, {faults:?}");
