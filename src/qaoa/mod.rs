@@ -25,4 +25,6 @@ pub use run::{AnglesSource, Qaoa, QaoaRun, RunSettings};
 pub use train::{Settled, TrainSettings};
 
 #[cfg(test)]
+mod agreement;
+#[cfg(test)]
 mod vectors;

@@ -21,7 +21,7 @@ use crate::mission::{Autopilot, FlightContext, LoiterHabit, Mission};
 use crate::planner::Settings;
 
 pub use field::{Field, FieldError};
-pub use judge::{LegVerdict, Verdict, judge};
+pub use judge::{LegVerdict, Verdict, fields, judge};
 pub use plan::{LegRecord, Progress, Replanned, replan};
 pub use reason::ReplanError;
 

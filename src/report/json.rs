@@ -288,28 +288,6 @@ impl CheckDocument {
     }
 }
 
-impl fmt::Display for PlanDocument {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write_json(self, f)
-    }
-}
-
-impl fmt::Display for CheckDocument {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write_json(self, f)
-    }
-}
-
-/// On one line; on many with `{:#}`.
-fn write_json(document: &impl Serialize, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-    let text = if f.alternate() {
-        serde_json::to_string_pretty(document)
-    } else {
-        serde_json::to_string(document)
-    };
-    f.write_str(&text.map_err(|_| fmt::Error)?)
-}
-
 impl From<&Verdict> for BeforeDocument {
     fn from(verdict: &Verdict) -> Self {
         Self {

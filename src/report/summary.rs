@@ -2,7 +2,7 @@
 
 use super::run::Run;
 use super::stretch::stretches;
-use super::text::{Table, change, clearance, count, duration, leg_label, push_wrapped};
+use super::text::{Table, change, clearance, count, duration, leg_label, push_wrapped, unbroken};
 use crate::planner::rounds::Round;
 use crate::replan::{LegRecord, Replanned, Verdict};
 use crate::units::Metres;
@@ -11,7 +11,7 @@ use crate::units::Metres;
 #[must_use]
 pub fn plan_summary(result: &Replanned, run: &Run<'_>) -> String {
     let (before, after) = (&result.before, &result.after);
-    let buffer = run.options.settings.buffer;
+    let buffer = unbroken(run.options.settings.buffer);
     let legs = before.legs.len();
     let headline = if result.is_changed() {
         format!(
@@ -96,7 +96,7 @@ fn time(record: &LegRecord) -> String {
 /// The summary of a judgement.
 #[must_use]
 pub fn check_summary(verdict: &Verdict, run: &Run<'_>) -> String {
-    let buffer = run.options.settings.buffer;
+    let buffer = unbroken(run.options.settings.buffer);
     let legs = verdict.legs.len();
     let too_near: Vec<_> =
         verdict.legs.iter().filter_map(|leg| Some((leg, leg.blocker.as_ref()?))).collect();
@@ -105,15 +105,17 @@ pub fn check_summary(verdict: &Verdict, run: &Run<'_>) -> String {
     let headline = if too_near.is_empty() {
         format!("Clear: the whole mission ({}) keeps {buffer}.", count(legs, "leg"))
     } else {
-        let collisions = match colliding {
-            0 => "none of them meets an obstacle or leaves the fence".to_owned(),
-            1 => "1 of them meets an obstacle or leaves the fence".to_owned(),
-            n => format!("{n} of them meet an obstacle or leave the fence"),
+        let comes = if too_near.len() == 1 { "comes" } else { "come" };
+        let collide = match colliding {
+            0 => "none collides".to_owned(),
+            1 => "1 collides".to_owned(),
+            many => format!("{many} collide"),
         };
         format!(
-            "Not clear: {} of {} not keep {buffer}; {collisions}.",
+            "Not clear: {} of {} {comes} nearer than {buffer} to an obstacle or the fence, and \
+             {collide}.",
             too_near.len(),
-            if legs == 1 { "1 leg does".to_owned() } else { format!("{legs} legs do") },
+            count(legs, "leg"),
         )
     };
     push_wrapped(&mut out, &headline, 0);

@@ -9,6 +9,9 @@ use crate::units::Metres;
 /// The width that everything fits into.
 pub(super) const WIDTH: usize = 80;
 
+/// A space that no line is broken at.
+pub(super) const UNBROKEN: char = '\u{a0}';
+
 /// Text from outside without what would control a terminal or is not allowed in XML.
 pub(super) fn plain(text: &str) -> String {
     let allowed = |c: char| !c.is_control() && !matches!(c, '\u{fffe}' | '\u{ffff}');
@@ -16,11 +19,12 @@ pub(super) fn plain(text: &str) -> String {
 }
 
 /// Appends a paragraph broken into lines of [`WIDTH`]; lines after the first are indented. A word
-/// that is longer than a line is broken as well.
+/// that is longer than a line is broken as well, a number stays with its unit ([`UNBROKEN`]).
 pub(super) fn push_wrapped(out: &mut String, text: &str, indent: usize) {
     let mut width = 0;
-    for word in plain(text).split_whitespace() {
-        let mut letters: Vec<char> = word.chars().collect();
+    for word in plain(text).split_ascii_whitespace() {
+        let mut letters: Vec<char> =
+            word.chars().map(|c| if c == UNBROKEN { ' ' } else { c }).collect();
         if width > 0 && width + 1 + letters.len() > WIDTH {
             out.push('\n');
             out.extend(std::iter::repeat_n(' ', indent));
@@ -49,6 +53,11 @@ pub(super) fn clearance(metres: Metres) -> String {
     }
     // 1e-6: what decimal fractions lose in binary.
     format!("{:.2} m", (metres.0 * 100.0 + 1e-6).floor() / 100.0)
+}
+
+/// A length to the centimetre that stays on one line.
+pub(super) fn unbroken(metres: Metres) -> String {
+    format!("{:.2}{UNBROKEN}m", metres.0)
 }
 
 /// The change from one length to another, such as `+6.9 %`; `-` where there is none to compare.

@@ -25,7 +25,7 @@ use super::engine::{Engine, EngineError, EngineKind, Sample};
 use super::ising::ChainIsing;
 use super::simd;
 use circuit::Circuit;
-use gradient::{Expectation, Gradient};
+use gradient::{Expectation, Gradient, WINDOW};
 use norms::Norms;
 use sampling::{Draw, Probability};
 use site::{MIN_LAYERS, Mixers};
@@ -60,7 +60,7 @@ impl ChainEngine {
         let inner = layers.max(MIN_LAYERS) as u32 - 1;
         let slab = 8_u64.saturating_mul(1_u64.checked_shl(2 * inner).unwrap_or(u64::MAX));
         let per_site = (SIDE_SLABS + SPECTRUM_SLABS) as u64;
-        let kept = gradient::window_sites(qubits, layers.max(MIN_LAYERS)) as u64;
+        let kept = gradient::window_sites(WINDOW, qubits, layers.max(MIN_LAYERS)) as u64;
         // The gradient's window; sampling keeps two slabs of every site.
         let slabs = per_site.saturating_mul(kept).max((qubits as u64).saturating_mul(2));
         slab.saturating_mul(slabs.saturating_add(64))
@@ -98,7 +98,8 @@ impl Engine for ChainEngine {
     fn expectation_and_gradient(&mut self, angles: &Angles) -> Result<(f64, Angles), EngineError> {
         let mixers = &self.mixers(angles)?;
         let Self { chain, workspace, .. } = self;
-        let (expectation, padded) = simd::run(Gradient { chain, mixers, workspace });
+        let (expectation, padded) =
+            simd::run(Gradient { chain, mixers, workspace, window: WINDOW });
         let padding = padded.layers() - angles.layers();
         let mut gradient = Angles::zeros(angles.layers());
         gradient.gammas_mut().copy_from_slice(&padded.gammas()[padding..]);

@@ -25,11 +25,6 @@ pub(super) struct Group {
 }
 
 impl Group {
-    /// Nothing yet.
-    pub(super) fn empty(trajectories: usize) -> Self {
-        Self { rows: vec![Row::ZERO; trajectories] }
-    }
-
     /// The empty prefix, before the first qubit, in every lane.
     pub(super) fn start(trajectories: usize) -> Self {
         Self { rows: vec![Row { re: [F4::ONE; 2], im: [F4::ZERO; 2] }; trajectories] }

@@ -3,13 +3,19 @@
 use svg::node::element::{Circle, Group, Path};
 
 use super::places::{goal_mark, start_mark};
-use super::scene::{Role, Scene};
+use super::scene::Scene;
 use super::text;
 use super::view::{Rect, px};
 use crate::airspace::Outline;
 use crate::geodesy::Xy;
 use crate::planner::candidates::Source;
 use crate::report::run::Run;
+
+/// The fills of the map, as its classes have them.
+const RIM: &str = "#dd8b1d";
+const BUFFER: &str = "#fbe3bd";
+const OBSTACLE: &str = "#8b95a1";
+const OUTSIDE: &str = "#d9dde2";
 
 /// The height of an entry.
 const ROW: f64 = 21.5;
@@ -18,15 +24,22 @@ pub(super) fn legend(scene: &Scene<'_>, run: &Run<'_>, rect: Rect) -> Group {
     let mut list = List { group: Group::new(), x: rect.x, y: rect.y + 16.0 };
     list.title("Legend");
     let line = |class: &str| Path::new().set("d", "M0 0h34").set("class", class);
-    if !scene.new.is_empty() {
-        let changed = scene.places.iter().any(|place| place.role == Role::Inserted);
-        if changed {
+    match scene.is_planned {
+        true => {
             list.entry(line("old"), "original route, where it was changed");
-        }
-        list.entry(line("new"), if changed { "new route" } else { "route" });
-        if changed {
+            list.entry(line("new"), "new route");
             list.entry(mark(4.5, "inserted"), "inserted waypoint with its item number");
         }
+        false => {
+            if !scene.old.is_empty() {
+                list.entry(line("old"), "leg that is not clear");
+            }
+            if !scene.new.is_empty() {
+                list.entry(line("new"), "leg that is clear");
+            }
+        }
+    }
+    if !scene.places.is_empty() {
         list.entry(mark(5.5, "item"), "item of the original mission");
         list.entry(Group::new().add(start_mark(MIDDLE)), "start");
         list.entry(Group::new().add(goal_mark(MIDDLE, 9.0)), "end");
@@ -43,14 +56,14 @@ pub(super) fn legend(scene: &Scene<'_>, run: &Run<'_>, rect: Rect) -> Group {
     let buffer = run.options.settings.buffer;
     if scene.outlines.iter().any(is_solid) {
         let swatch = Group::new()
-            .add(box_("rim", 34.0, 16.0))
-            .add(box_("buffer", 32.0, 14.0))
-            .add(box_("obstacle", 20.0, 6.0));
+            .add(box_(RIM, 34.0, 16.0))
+            .add(box_(BUFFER, 32.0, 14.0))
+            .add(box_(OBSTACLE, 20.0, 6.0));
         list.entry(swatch, &format!("obstacle and its buffer of {buffer}"));
     }
     if scene.has_inclusion() {
         let swatch = Group::new()
-            .add(box_("outside", 34.0, 16.0))
+            .add(box_(OUTSIDE, 34.0, 16.0))
             .add(Path::new().set("d", "M0 8h34").set("class", "fence"));
         list.entry(swatch, "outside of the fence");
     }
@@ -65,11 +78,9 @@ fn mark(radius: f64, class: &str) -> Circle {
 }
 
 /// A box around the middle of a swatch.
-fn box_(class: &str, width: f64, height: f64) -> svg::node::element::Rectangle {
-    Rect { x: MIDDLE.x - width / 2.0, y: -height / 2.0, width, height }
-        .element()
-        .set("class", class)
-        .set("stroke", "none")
+fn box_(fill: &str, width: f64, height: f64) -> svg::node::element::Rectangle {
+    let rect = Rect { x: MIDDLE.x - width / 2.0, y: -height / 2.0, width, height };
+    rect.element().set("fill", fill)
 }
 
 /// Entries below each other.

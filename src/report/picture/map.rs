@@ -17,14 +17,9 @@ pub(super) fn map(scene: &Scene<'_>, view: &View) -> Group {
         .set("clip-path", "url(#map)")
         .add(view.panel.element().set("class", "panel"))
         .add(buffers(scene, view))
-        .add(
-            path(inside_bands(scene, view), "buffer")
-                .set("fill-opacity", 0)
-                .set("stroke-width", px(2.0 * scene.margin * view.scale)),
-        )
         .add(outside(scene, view))
-        .add(path(obstacles(scene, view), "obstacle"))
-        .add(path(fences(scene, view), "fence"))
+        .add(path(obstacles(scene, view, 0.0), "obstacle"))
+        .add(path(inclusions(scene, view).concat(), "fence"))
         .add(candidates(scene, view))
         .add(path(lines(&scene.old, view), "old"))
         .add(path(lines(&scene.new, view), "casing"))
@@ -55,8 +50,8 @@ fn visible<'a>(
     })
 }
 
-fn obstacles(scene: &Scene<'_>, view: &View) -> String {
-    let data = visible(scene, view, 0.0).map(|outline| match outline {
+fn obstacles(scene: &Scene<'_>, view: &View, around: f64) -> String {
+    let data = visible(scene, view, around).map(|outline| match outline {
         Outline::Solid(rings) => rings.iter().map(|ring| view.ring(ring)).collect(),
         Outline::SolidDisc { centre, radius } => view.circle(*centre, *radius),
         Outline::Zone(_) | Outline::ZoneDisc { .. } => String::new(),
@@ -64,39 +59,15 @@ fn obstacles(scene: &Scene<'_>, view: &View) -> String {
     data.collect()
 }
 
-/// The buffers of the obstacles. What lies within `margin` of a ring is what a round pen of twice
-/// that width covers: exact, rounded corners included, and joined where buffers meet.
+/// The buffers. What lies within `margin` of a ring is what a round pen of twice that width covers:
+/// exact, rounded corners included, and joined where buffers meet. The half of it that is inside an
+/// obstacle or outside an inclusion is painted over later.
 fn buffers(scene: &Scene<'_>, view: &View) -> Group {
-    let margin = scene.margin * view.scale;
-    let rings: String = visible(scene, view, scene.margin)
-        .filter_map(|outline| match outline {
-            Outline::Solid(rings) => Some(rings.iter().map(|r| view.ring(r)).collect::<String>()),
-            _ => None,
-        })
-        .collect();
-    let discs: String = visible(scene, view, scene.margin)
-        .filter_map(|outline| match outline {
-            Outline::SolidDisc { centre, radius } => {
-                Some(view.circle(*centre, radius + scene.margin))
-            }
-            _ => None,
-        })
-        .collect();
+    let data = obstacles(scene, view, scene.margin) + &inclusions(scene, view).concat();
+    let pen = 2.0 * scene.margin * view.scale;
     Group::new()
-        .add(path(rings.clone(), "rim").set("stroke-width", px(2.0 * margin + 2.0)))
-        .add(path(discs.clone(), "rim").set("stroke-width", 2))
-        .add(path(rings, "buffer").set("stroke-width", px(2.0 * margin)))
-        .add(path(discs, "buffer").set("stroke", "none"))
-}
-
-/// The edges of inclusions: a pen of twice the margin covers what is too near to them. Its outer
-/// half is covered by [`outside`].
-fn inside_bands(scene: &Scene<'_>, view: &View) -> String {
-    inclusions(scene, view).concat()
-}
-
-fn fences(scene: &Scene<'_>, view: &View) -> String {
-    inclusions(scene, view).concat()
+        .add(path(data.clone(), "rim").set("stroke-width", px(pen + 2.0)))
+        .add(path(data, "buffer").set("stroke-width", px(pen)))
 }
 
 /// Path data of each inclusion, or of their union.

@@ -23,7 +23,7 @@ use svg::node::element::{Group, Rectangle, Style, Text};
 use super::run::Run;
 use super::text::{change, clearance, count, plain};
 use crate::geodesy::ProjectionError;
-use crate::replan::Replanned;
+use crate::replan::{Field, LegRecord, Replanned, Verdict};
 use scene::Scene;
 use view::{Rect, View};
 
@@ -46,8 +46,8 @@ text{font:13px 'Segoe UI',Roboto,Helvetica,Arial,sans-serif;fill:#2b3440}\
 .small{font-size:11.5px;fill:#52606d}.head{font-weight:600}\
 .panel{fill:#f8f7f3}.frame{fill:none;stroke:#c3c8ce}\
 .obstacle{fill:#8b95a1;stroke:#5c6773;stroke-width:.8;stroke-linejoin:round}\
-.rim{fill:#dd8b1d;stroke:#dd8b1d;stroke-linejoin:round}\
-.buffer{fill:#fbe3bd;stroke:#fbe3bd;stroke-linejoin:round}\
+.rim{fill:none;stroke:#dd8b1d;stroke-linejoin:round}\
+.buffer{fill:none;stroke:#fbe3bd;stroke-linejoin:round}\
 .outside{fill:#d9dde2;fill-rule:evenodd}\
 .fence{fill:none;stroke:#2f7d4f;stroke-width:2}\
 .route{fill:none;stroke-width:2;stroke-linejoin:round;stroke-opacity:.9}\
@@ -63,16 +63,47 @@ text{font:13px 'Segoe UI',Roboto,Helvetica,Arial,sans-serif;fill:#2b3440}\
 .number{font-size:12px;font-weight:600;fill:#0b3d91;stroke:#fff;stroke-width:3.5;\
 stroke-linejoin:round;paint-order:stroke;text-anchor:middle}\
 .ink{fill:#2b3440}.plate{fill:#fff;fill-opacity:.88}\
-.axis{stroke:#9aa3ad}.tick{stroke:#e3e6ea}.later{fill:none;stroke:#7d92ad;stroke-opacity:.5}\
+.axis{stroke:#9aa3ad}.tick{stroke:#e3e6ea}.later{fill:none;stroke:#6f86a6;stroke-opacity:.6}\
 .first{fill:none;stroke-width:2.6;stroke-linejoin:round}\
 .middle{text-anchor:middle}.end{text-anchor:end}";
 
-/// Draws a plan.
+/// What a picture is of.
+#[derive(Debug, Clone, Copy)]
+pub struct Subject<'a> {
+    before: &'a Verdict,
+    /// The new mission, its inserted items and how it was found.
+    after: Option<(&'a Verdict, &'a [usize], &'a [LegRecord])>,
+    fields: &'a [Field],
+}
+
+impl<'a> Subject<'a> {
+    /// A mission that was judged but not planned, or for which there is no plan.
+    #[must_use]
+    pub fn judged(verdict: &'a Verdict, fields: &'a [Field]) -> Self {
+        Self { before: verdict, after: None, fields }
+    }
+}
+
+impl<'a> From<&'a Replanned> for Subject<'a> {
+    /// A mission that was planned.
+    fn from(result: &'a Replanned) -> Self {
+        let Replanned { before, after, inserted, legs, fields, .. } = result;
+        let after = (!inserted.is_empty()).then_some((after, inserted.as_slice(), legs.as_slice()));
+        Self { before, after, fields }
+    }
+}
+
+/// Draws a mission; `title` is free text.
 ///
 /// # Errors
 /// [`ProjectionError`] where a place of the mission cannot be projected into the drawn zone.
-pub fn picture(result: &Replanned, run: &Run<'_>, title: &str) -> Result<String, ProjectionError> {
-    let scene = Scene::new(result)?;
+pub fn picture<'a>(
+    subject: impl Into<Subject<'a>>,
+    run: &Run<'_>,
+    title: &str,
+) -> Result<String, ProjectionError> {
+    let subject = subject.into();
+    let scene = Scene::new(&subject)?;
     let (low, high) = scene.extent();
     let width = PAGE - 2.0 * BORDER;
     let (least, most) = MAP_HEIGHT;
@@ -92,7 +123,7 @@ pub fn picture(result: &Replanned, run: &Run<'_>, title: &str) -> Result<String,
         .set("height", page_height as i32)
         .add(Style::new(STYLE))
         .add(Rectangle::new().set("width", "100%").set("height", "100%").set("fill", "#fff"))
-        .add(header(result, run, title))
+        .add(header(&subject, run, title))
         .add(map::map(&scene, &view))
         .add(training::losses(&scene.records, losses))
         .add(training::lengths(&scene.records, lengths))
@@ -101,34 +132,33 @@ pub fn picture(result: &Replanned, run: &Run<'_>, title: &str) -> Result<String,
 }
 
 /// The title and the figures before and after.
-fn header(result: &Replanned, run: &Run<'_>, title: &str) -> Group {
-    let (before, after) = (&result.before, &result.after);
-    let buffer = run.options.settings.buffer;
-    let figures = if result.is_changed() {
-        format!(
-            "length {:.1} \u{2192} {:.1} ({})   \u{b7}   clearance {} \u{2192} {}   \u{b7}   \
-             {}   \u{b7}   buffer {buffer}   \u{b7}   seed {}",
-            before.length(),
-            after.length(),
-            change(before.length(), after.length()),
-            clearance(before.clearance()),
-            clearance(after.clearance()),
-            count(result.inserted.len(), "new waypoint"),
-            run.options.settings.seed,
-        )
-    } else {
-        format!(
-            "nothing to re-plan   \u{b7}   length {:.1}   \u{b7}   clearance {}   \u{b7}   \
-             buffer {buffer}",
-            after.length(),
-            clearance(after.clearance()),
-        )
+fn header(subject: &Subject<'_>, run: &Run<'_>, title: &str) -> Group {
+    let before = subject.before;
+    let settings = &run.options.settings;
+    let was = (format!("{:.1}", before.length()), clearance(before.clearance()));
+    let mut figures = match subject.after {
+        None => {
+            let verdict = if before.is_clear() { "clear" } else { "not clear" };
+            vec![verdict.to_owned(), format!("length {}", was.0), format!("clearance {}", was.1)]
+        }
+        Some((after, inserted, _)) => {
+            let rise = change(before.length(), after.length());
+            vec![
+                format!("length {} \u{2192} {:.1} ({rise})", was.0, after.length()),
+                format!("clearance {} \u{2192} {}", was.1, clearance(after.clearance())),
+                count(inserted.len(), "new waypoint"),
+            ]
+        }
     };
+    figures.push(format!("buffer {}", settings.buffer));
+    if subject.after.is_some() {
+        figures.push(format!("seed {}", settings.seed));
+    }
     Group::new().add(text(BORDER, BORDER + 24.0, "title", &plain(title))).add(text(
         BORDER,
         BORDER + 48.0,
         "sub",
-        &figures,
+        &figures.join("  \u{b7}  "),
     ))
 }
 

@@ -2,12 +2,13 @@
 
 use geo::MultiPolygon;
 
+use super::Subject;
 use crate::airspace::Outline;
 use crate::geodesy::{LocalFrame, ProjectionError, Xy, Zone};
 use crate::mission::Leg;
 use crate::mission::legs::{LegKind, number as item_number};
 use crate::planner::candidates::Source;
-use crate::replan::{Field, LegRecord, Replanned, Verdict};
+use crate::replan::{Field, LegRecord, LegVerdict, Verdict};
 
 /// The share of the route's extent that is shown around it.
 const AROUND: f64 = 0.06;
@@ -22,7 +23,7 @@ pub(super) struct Edge {
     pub(super) to: Xy,
 }
 
-/// What a place of the new mission is.
+/// What a place of the mission is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Role {
     /// An item of the original.
@@ -31,7 +32,7 @@ pub(super) enum Role {
     Inserted,
 }
 
-/// A place of the new mission.
+/// A place of the mission.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Place {
     pub(super) at: Xy,
@@ -50,7 +51,11 @@ pub(super) struct Scene<'a> {
     pub(super) outlines: &'a [Outline],
     pub(super) union: Option<&'a MultiPolygon>,
     pub(super) margin: f64,
+    /// Whether there is a new mission besides the original.
+    pub(super) is_planned: bool,
+    /// What is not flown any more, or is not clear.
     pub(super) old: Vec<Edge>,
+    /// What is flown, or is clear.
     pub(super) new: Vec<Edge>,
     /// The legs planned in this zone.
     pub(super) records: Vec<&'a LegRecord>,
@@ -60,11 +65,12 @@ pub(super) struct Scene<'a> {
 }
 
 impl<'a> Scene<'a> {
-    pub(super) fn new(result: &'a Replanned) -> Result<Self, ProjectionError> {
+    pub(super) fn new(subject: &Subject<'a>) -> Result<Self, ProjectionError> {
         let mut scene = Self {
             outlines: &[],
             union: None,
             margin: 0.0,
+            is_planned: false,
             old: Vec::new(),
             new: Vec::new(),
             records: Vec::new(),
@@ -72,22 +78,33 @@ impl<'a> Scene<'a> {
             start: None,
             goal: None,
         };
-        let Some(field) = main_field(result) else { return Ok(scene) };
+        let Some(field) = main_field(subject) else { return Ok(scene) };
         let frame = LocalFrame::new(field.zone, field.origin)?;
-        let only = result.fields.len() == 1;
+        let only = subject.fields.len() == 1;
         let is_here = |leg: &Leg| leg.kind != LegKind::Stay && (only || zone_of(leg) == field.zone);
-        let edges = |verdict: &Verdict| {
-            let legs = verdict.legs.iter().map(|verdict| &verdict.leg).filter(|leg| is_here(leg));
-            legs.map(|leg| edge(leg, &frame)).collect::<Result<Vec<_>, _>>()
+        let edges = |verdict: &Verdict, wanted: &dyn Fn(&LegVerdict) -> bool| {
+            let legs = verdict.legs.iter().filter(|v| is_here(&v.leg) && wanted(v));
+            legs.map(|v| edge(&v.leg, &frame)).collect::<Result<Vec<_>, _>>()
         };
         scene.outlines = &field.outlines;
         scene.union = field.union.as_ref();
         scene.margin = field.margin;
-        scene.old = edges(&result.before)?;
-        scene.new = edges(&result.after)?;
-        scene.records = result.legs.iter().filter(|record| record.zone == field.zone).collect();
-        scene.places = places(result, &frame, is_here)?;
-        let way = result.after.places();
+        let (flown, inserted) = match subject.after {
+            None => {
+                scene.old = edges(subject.before, &|verdict| verdict.blocker.is_some())?;
+                scene.new = edges(subject.before, &|verdict| verdict.blocker.is_none())?;
+                (subject.before, [].as_slice())
+            }
+            Some((after, inserted, records)) => {
+                scene.old = edges(subject.before, &|_| true)?;
+                scene.new = edges(after, &|_| true)?;
+                scene.records = records.iter().filter(|r| r.zone == field.zone).collect();
+                (after, inserted)
+            }
+        };
+        scene.is_planned = subject.after.is_some();
+        scene.places = places(flown, inserted, &frame, is_here)?;
+        let way = flown.places();
         let end = |place: Option<&crate::geodesy::LatLon>| {
             place.map(|&place| frame.to_local(place)).transpose()
         };
@@ -184,11 +201,11 @@ impl Extent {
 }
 
 /// The field with the most legs.
-fn main_field(result: &Replanned) -> Option<&Field> {
+fn main_field<'a>(subject: &Subject<'a>) -> Option<&'a Field> {
     let legs = |field: &&Field| {
-        result.before.legs.iter().filter(|verdict| zone_of(&verdict.leg) == field.zone).count()
+        subject.before.legs.iter().filter(|verdict| zone_of(&verdict.leg) == field.zone).count()
     };
-    result.fields.iter().max_by_key(legs)
+    subject.fields.iter().max_by_key(legs)
 }
 
 fn zone_of(leg: &Leg) -> Zone {
@@ -200,9 +217,10 @@ fn edge(leg: &Leg, frame: &LocalFrame) -> Result<Edge, ProjectionError> {
     Ok(Edge { from, to })
 }
 
-/// Where the legs of the new mission end, and where the first one starts.
+/// Where the legs that are flown end, and where the first one starts.
 fn places(
-    result: &Replanned,
+    flown: &Verdict,
+    inserted: &[usize],
     frame: &LocalFrame,
     is_here: impl Fn(&Leg) -> bool,
 ) -> Result<Vec<Place>, ProjectionError> {
@@ -218,7 +236,7 @@ fn places(
             None => places.push(place),
         }
     };
-    for (k, verdict) in result.after.legs.iter().filter(|v| is_here(&v.leg)).enumerate() {
+    for (k, verdict) in flown.legs.iter().filter(|v| is_here(&v.leg)).enumerate() {
         let leg = &verdict.leg;
         if k == 0 {
             // A start that is an item's place: the mission begins there.
@@ -230,8 +248,8 @@ fn places(
             LegKind::Return(_) => None,
             _ => leg.to.item,
         };
-        let inserted = item.is_some_and(|item| result.inserted.binary_search(&item).is_ok());
-        let role = if inserted { Role::Inserted } else { Role::Item };
+        let is_new = item.is_some_and(|item| inserted.binary_search(&item).is_ok());
+        let role = if is_new { Role::Inserted } else { Role::Item };
         let (at, circle) = (frame.to_local(leg.to.position)?, leg.to.circle.0);
         let clearance = verdict.clearance.0.is_finite().then_some(verdict.clearance.0);
         add(Place { at, number: item.map(item_number), role, circle, clearance });

@@ -99,7 +99,7 @@ fn names(records: &[&LegRecord], chart: &Chart, later: usize) -> Group {
 
 /// The length of each leg's path after each round, as a detour over the straight line.
 pub(super) fn lengths(records: &[&LegRecord], rect: Rect) -> Group {
-    let title = "Detour over the straight line after each round (%)";
+    let title = "Detour over the straight line (%)";
     let detours: Vec<Vec<f64>> = records.iter().map(|record| detours(record)).collect();
     let all = || detours.iter().flatten().copied();
     let most = detours.iter().map(Vec::len).max().unwrap_or(0);
@@ -113,7 +113,7 @@ pub(super) fn lengths(records: &[&LegRecord], rect: Rect) -> Group {
         Axis::linear(0.0, (most - 1).max(1) as f64),
         Axis::linear((low - room).max(0.0), high + room),
     );
-    let mut group = chart.axes(title, "round (0: the best candidate)");
+    let mut group = chart.axes(title, "after round (0: the best candidate)");
     for (detours, colour) in detours.iter().zip(COLOURS.into_iter().cycle()) {
         let data = chart.curve(detours.iter().enumerate().map(|(k, &d)| (k as f64, d)));
         let path = Path::new().set("d", data).set("class", "first").set("stroke", colour);
