@@ -67,12 +67,15 @@ pub enum Boundary {
 /// inscribed: nothing outside the circle is allowed.
 const CIRCLE_SIDES: u32 = 256;
 
+/// The bounding box of one ring of an obstacle: its region, and which of the region's rings.
+type SolidBox = GeomWithData<Rectangle<[f64; 2]>, (RegionId, usize)>;
+
 /// Fences as planar barriers in the metres of one local frame, unbuffered.
 #[derive(Debug)]
 pub struct Airspace {
     outlines: Vec<Outline>,
     barriers: BarrierIndex,
-    solids: RTree<GeomWithData<Rectangle<[f64; 2]>, (RegionId, usize)>>,
+    solids: RTree<SolidBox>,
     /// With [`InclusionRule::Any`]: the union of all inclusions, where there are any.
     union: Option<MultiPolygon>,
     zones: Vec<RegionId>,
@@ -277,7 +280,7 @@ fn regions(outlines: &[Outline]) -> impl Iterator<Item = (RegionId, &Outline)> {
     outlines.iter().enumerate().map(|(i, outline)| (RegionId(i as u32), outline))
 }
 
-fn solid_boxes(outlines: &[Outline]) -> Vec<GeomWithData<Rectangle<[f64; 2]>, (RegionId, usize)>> {
+fn solid_boxes(outlines: &[Outline]) -> Vec<SolidBox> {
     let mut boxes = Vec::new();
     for (id, outline) in regions(outlines) {
         if let Outline::Solid(rings) = outline {

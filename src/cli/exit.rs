@@ -4,7 +4,7 @@ use std::io::Write;
 use std::process::ExitCode;
 
 use crate::cli::files::FileError;
-//QQ use crate::cli::qaoa::QaoaCommandError;
+use crate::cli::qaoa::QaoaCommandError;
 use crate::fence::items::FenceItemError;
 use crate::formats::FormatError;
 use crate::link::LinkError;
@@ -82,7 +82,7 @@ macro_rules! usage_errors {
     )*};
 }
 
-usage_errors!(FileError, FormatError, FenceItemError, /*QQ QaoaCommandError,*/ StoreError);
+usage_errors!(FileError, FormatError, FenceItemError, QaoaCommandError, StoreError);
 
 impl From<ReplanError> for CliError {
     fn from(error: ReplanError) -> Self {

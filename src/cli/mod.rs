@@ -5,16 +5,18 @@
 //! - [`files`]: scenarios, missions and fences from files, results to files;
 //! - [`progress`]: what is shown while something runs;
 //! - [`plan`], [`check`], [`once`], [`qaoa`]: one command each;
+//! - [`memory`]: what the machine has left;
 //! - [`exit`]: errors and their exit codes.
 
 pub mod check;
 pub mod exit;
 pub mod files;
+pub mod memory;
 pub mod once;
 pub mod options;
 pub mod plan;
 pub mod progress;
-//QQ pub mod qaoa;
+pub mod qaoa;
 
 use std::process::ExitCode;
 
@@ -44,8 +46,8 @@ enum Command {
     Plan(plan::PlanArgs),
     /// Judge any mission against any fences.
     Check(check::CheckArgs),
-    //QQ    /// Run QAOA alone on an Ising problem.
-    //QQ    Qaoa(qaoa::QaoaArgs),
+    /// Run QAOA alone on an Ising problem.
+    Qaoa(qaoa::QaoaArgs),
 }
 
 /// Runs the command of a parsed command line, prints its result on stdout and its error on
@@ -58,7 +60,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Once(args) => once::run(args, &shown),
         Command::Plan(args) => plan::run(&args, &shown),
         Command::Check(args) => check::run(&args, &shown),
-        //QQ        Command::Qaoa(args) => qaoa::run(&args).map_err(CliError::from),
+        Command::Qaoa(args) => qaoa::run(&args).map_err(CliError::from),
     };
     match outcome {
         Ok(text) => exit::print(&text, ExitCode::SUCCESS),

@@ -80,17 +80,15 @@ pub enum EngineError {
     },
     /// The workspace would not fit.
     #[error(
-        "the {engine} engine needs {} MiB for {qubits} qubits and {layers} layers, but {} MiB are \
-         available; use fewer qubits or layers",
-        needed >> 20, available >> 20
+        "the {engine} engine needs {} MiB for {qubits} qubits, but {} MiB are available; use fewer \
+         qubits, or fewer layers with the chain engine",
+        needed.div_ceil(1 << 20), available >> 20
     )]
     Memory {
         /// Which engine.
         engine: EngineKind,
         /// Number of qubits.
         qubits: usize,
-        /// Number of layers.
-        layers: usize,
         /// Bytes the workspace takes.
         needed: u64,
         /// Bytes there are.

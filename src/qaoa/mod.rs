@@ -13,6 +13,7 @@ pub mod engine;
 pub mod ising;
 pub mod run;
 mod simd;
+pub mod statevector;
 pub mod train;
 pub mod viterbi;
 
@@ -23,5 +24,7 @@ pub use ising::{ChainIsing, Ising, IsingError, Scale};
 pub use run::{AnglesSource, Qaoa, QaoaRun, RunSettings};
 pub use train::{Settled, TrainSettings};
 
+#[cfg(test)]
+mod agreement;
 #[cfg(test)]
 mod vectors;

@@ -9,6 +9,7 @@ use super::bits::Bits;
 use super::chain::ChainEngine;
 use super::engine::{Engine, EngineChoice, EngineError, EngineKind, Sample};
 use super::ising::{Ising, Scale};
+use super::statevector::{Precision, StatevectorEngine};
 use super::train::{TrainSettings, Training, train};
 use super::viterbi::exact_optimum;
 
@@ -103,14 +104,22 @@ pub struct QaoaRun {
 #[derive(Debug)]
 pub struct Qaoa {
     memory_limit: u64,
+    precision: Precision,
     chain: Option<ChainEngine>,
+    statevector: Option<StatevectorEngine>,
 }
 
 impl Qaoa {
     /// Engines may use `memory_limit` bytes.
     #[must_use]
     pub fn new(memory_limit: u64) -> Self {
-        Self { memory_limit, chain: None }
+        Self { memory_limit, precision: Precision::Double, chain: None, statevector: None }
+    }
+
+    /// The precision of the statevector engine (`chain` is always in double precision).
+    #[must_use]
+    pub fn with_precision(self, precision: Precision) -> Self {
+        Self { precision, ..self }
     }
 
     /// One run.
@@ -190,10 +199,15 @@ impl Qaoa {
                 };
                 Ok(self.chain.insert(engine))
             }
-            _ => {
+            (EngineKind::Chain, None) => {
                 let distant = ising.couplings().iter().find(|&&(i, j, _)| j != i + 1);
                 let (i, j) = distant.map_or((0, 0), |&(i, j, _)| (i, j));
                 Err(EngineError::NotAChain { i, j })
+            }
+            (EngineKind::Statevector, _) => {
+                self.statevector = None;
+                let engine = StatevectorEngine::new(ising, self.precision, self.memory_limit)?;
+                Ok(self.statevector.insert(engine))
             }
         }
     }

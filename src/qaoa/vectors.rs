@@ -8,6 +8,7 @@ use super::angles::Angles;
 use super::chain::ChainEngine;
 use super::engine::Engine;
 use super::ising::Ising;
+use super::statevector::{Precision, StatevectorEngine};
 use super::viterbi::exact_optimum;
 
 #[derive(Deserialize)]
@@ -79,6 +80,16 @@ fn the_chain_engine_agrees_with_the_reference_on_every_chain() {
     for case in chains {
         let chain = case.ising().to_chain().unwrap();
         case.check(&mut ChainEngine::new(chain, 1 << 30), 1e-9);
+    }
+}
+
+#[test]
+fn the_statevector_engine_agrees_with_the_reference_on_every_graph() {
+    for case in cases() {
+        for (precision, tolerance) in [(Precision::Double, 1e-9), (Precision::Single, 2e-4)] {
+            let mut engine = StatevectorEngine::new(&case.ising(), precision, 1 << 30).unwrap();
+            case.check(&mut engine, tolerance);
+        }
     }
 }
 

@@ -10,7 +10,7 @@ use super::site::Mixers;
 pub(super) struct Circuit {
     pub(super) gammas: Vec<f64>,
     /// `walk[s][a]`: ⟨s|e^{−iβ_p X}|a_p⟩ … ⟨a_2|e^{−iβ_1 X}|a_1⟩ ⟨a_1|+⟩ for the measured bit s.
-    pub(super) walk: [Vec<Complex64>; 2],
+    walk: [Vec<Complex64>; 2],
 }
 
 impl Circuit {
@@ -40,8 +40,14 @@ impl Circuit {
         self.walk[0].len()
     }
 
+    /// The amplitudes of one qubit with field `h`, for each bit.
+    pub(super) fn factors(&self, h: f64) -> [Vec<Complex64>; 2] {
+        let phases = self.phases(h);
+        [0, 1].map(|bit| self.walk[bit].iter().zip(&phases).map(|(w, p)| w * p).collect())
+    }
+
     /// `e^{−i h Σ_l γ_l a_l}` over all trajectories.
-    pub(super) fn phases(&self, h: f64) -> Vec<Complex64> {
+    fn phases(&self, h: f64) -> Vec<Complex64> {
         let mut phases = vec![Complex64::ONE];
         for gamma in &self.gammas {
             let plus = Complex64::cis(-h * gamma);

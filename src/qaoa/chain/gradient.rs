@@ -59,16 +59,16 @@ fn total_energy(spectrum: &Slab, blocks: usize) -> f64 {
     sum.sum()
 }
 
-/// Sites whose right sides are kept at once, so that they stay in the processor's cache.
-const WINDOW: usize = 48;
+/// Sites whose right sides are kept at once by default, so that they stay in the processor's cache.
+pub(super) const WINDOW: usize = 48;
 
-/// Sites of a window for a chain of `qubits` and `layers`, with those to its right that it depends on.
+/// Sites of a window in a chain of `qubits`, with those to its right that it depends on.
 ///
 /// A side's norm does not depend on sites more than p away (nobody looks there, and everything outside
 /// the light cone cancels), nor does a derivative on energies that far: the sweep from the right can
-/// start there as if the chain ended.
-pub(super) fn window_sites(qubits: usize, layers: usize) -> usize {
-    qubits.min(WINDOW + layers + 2)
+/// start twice that far away as if the chain ended.
+pub(super) fn window_sites(window: usize, qubits: usize, layers: usize) -> usize {
+    qubits.min(window.saturating_add(2 * layers + 2))
 }
 
 /// ⟨H⟩ and its derivatives with respect to all angles of the padded circuit.
@@ -76,6 +76,8 @@ pub(super) struct Gradient<'a> {
     pub(super) chain: &'a ChainIsing,
     pub(super) mixers: &'a Mixers,
     pub(super) workspace: &'a mut Workspace,
+    /// Sites whose right sides are kept at once.
+    pub(super) window: usize,
 }
 
 impl Kernel for Gradient<'_> {
@@ -83,9 +85,9 @@ impl Kernel for Gradient<'_> {
 
     #[inline(always)]
     fn run(self) -> (f64, Angles) {
-        let Self { chain, mixers, workspace } = self;
+        let Self { chain, mixers, workspace, window } = self;
         let (n, blocks) = (chain.qubits(), mixers.blocks());
-        let kept = window_sites(n, mixers.gammas.len());
+        let kept = window_sites(window, n, mixers.gammas.len());
         workspace.reserve(mixers, kept);
         let mut duals = Duals::new(blocks);
         let mut gradient = Angles::zeros(mixers.gammas.len());
@@ -93,8 +95,8 @@ impl Kernel for Gradient<'_> {
         end_of_chain(&mut workspace.side, blocks);
         let mut start = 0;
         while start < n {
-            let reach = n.min(start + kept);
-            let end = if reach == n { n } else { start + WINDOW };
+            let reach = n.min(start.saturating_add(kept));
+            let end = if reach == n { n } else { start + window };
             sweep_from_right(chain, mixers, workspace, start..reach);
             for i in start..end {
                 joint = visit(
@@ -332,5 +334,35 @@ impl Duals {
             gradient.gammas_mut()[layer] += 2.0 * terms.sum::<f64>();
         }
         gradient.gammas_mut()[inner] += self.last_phase;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn windows_of_any_size_give_the_same_derivatives(
+            window in 1_usize..12,
+            layers in 1_usize..6,
+            fields in prop::collection::vec(-1.5..1.5_f64, 14),
+            couplings in prop::collection::vec(-1.5..1.5_f64, 13),
+            angles in prop::collection::vec(-1.0..1.0_f64, 10),
+        ) {
+            let chain = &ChainIsing::new(0.3, fields, couplings).unwrap();
+            let (gammas, betas) = (angles[..layers].to_vec(), angles[5..5 + layers].to_vec());
+            let mixers = &Mixers::new(&Angles::new(gammas, betas).unwrap());
+            let derivatives = |window: usize| {
+                let workspace = &mut Workspace::default();
+                let (expectation, gradient) = Gradient { chain, mixers, workspace, window }.run();
+                [vec![expectation], gradient.iter().collect()].concat()
+            };
+            for (part, whole) in derivatives(window).into_iter().zip(derivatives(usize::MAX / 2)) {
+                prop_assert!((part - whole).abs() < 1e-11, "{} instead of {}", part, whole);
+            }
+        }
     }
 }

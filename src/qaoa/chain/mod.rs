@@ -5,12 +5,14 @@
 //! needs. `folded` stores such vectors and takes them over a bond, `site` has the weights of one qubit,
 //! `sweep` steps from site to site, and `gradient` makes ⟨H⟩ and all derivatives out of a sweep from
 //! each end. For bitstrings the ket's 2^p amplitudes are enough: `circuit` has them for one qubit,
-//! `norms` what lies to the right, and `sampling` draws from both.
+//! `norms` what lies to the right, `prefixes` carries them
+//! from qubit to qubit, and `sampling` draws from all that.
 
 mod circuit;
 mod folded;
 mod gradient;
 mod norms;
+mod prefixes;
 mod sampling;
 mod site;
 mod sweep;
@@ -23,8 +25,9 @@ use super::engine::{Engine, EngineError, EngineKind, Sample};
 use super::ising::ChainIsing;
 use super::simd;
 use circuit::Circuit;
-use gradient::{Expectation, Gradient};
+use gradient::{Expectation, Gradient, WINDOW};
 use norms::Norms;
+use sampling::{Draw, Probability};
 use site::{MIN_LAYERS, Mixers};
 use sweep::{SIDE_SLABS, SPECTRUM_SLABS, Workspace};
 
@@ -57,7 +60,7 @@ impl ChainEngine {
         let inner = layers.max(MIN_LAYERS) as u32 - 1;
         let slab = 8_u64.saturating_mul(1_u64.checked_shl(2 * inner).unwrap_or(u64::MAX));
         let per_site = (SIDE_SLABS + SPECTRUM_SLABS) as u64;
-        let kept = gradient::window_sites(qubits, layers.max(MIN_LAYERS)) as u64;
+        let kept = gradient::window_sites(WINDOW, qubits, layers.max(MIN_LAYERS)) as u64;
         // The gradient's window; sampling keeps two slabs of every site.
         let slabs = per_site.saturating_mul(kept).max((qubits as u64).saturating_mul(2));
         slab.saturating_mul(slabs.saturating_add(64))
@@ -71,7 +74,7 @@ impl ChainEngine {
         }
         let (needed, available) = (Self::memory(qubits, layers), self.memory_limit);
         if needed > available {
-            return Err(EngineError::Memory { engine, qubits, layers, needed, available });
+            return Err(EngineError::Memory { engine, qubits, needed, available });
         }
         Ok(Mixers::new(angles))
     }
@@ -95,7 +98,8 @@ impl Engine for ChainEngine {
     fn expectation_and_gradient(&mut self, angles: &Angles) -> Result<(f64, Angles), EngineError> {
         let mixers = &self.mixers(angles)?;
         let Self { chain, workspace, .. } = self;
-        let (expectation, padded) = simd::run(Gradient { chain, mixers, workspace });
+        let (expectation, padded) =
+            simd::run(Gradient { chain, mixers, workspace, window: WINDOW });
         let padding = padded.layers() - angles.layers();
         let mut gradient = Angles::zeros(angles.layers());
         gradient.gammas_mut().copy_from_slice(&padded.gammas()[padding..]);
@@ -113,7 +117,7 @@ impl Engine for ChainEngine {
         let Self { chain, workspace, .. } = self;
         let norms = simd::run(Norms { chain, mixers, workspace });
         let circuit = Circuit::new(mixers);
-        Ok(sampling::sample(&circuit, &self.chain, &norms, shots, rng))
+        Ok(simd::run(Draw { circuit: &circuit, chain, right_norms: &norms, shots, rng }))
     }
 
     fn probability(&mut self, angles: &Angles, bits: &Bits) -> Result<f64, EngineError> {
@@ -121,6 +125,7 @@ impl Engine for ChainEngine {
         if found != expected {
             return Err(EngineError::BitsLength { found, expected });
         }
-        Ok(sampling::probability(&Circuit::new(&self.mixers(angles)?), &self.chain, bits))
+        let circuit = Circuit::new(&self.mixers(angles)?);
+        Ok(simd::run(Probability { circuit: &circuit, chain: &self.chain, bits }))
     }
 }

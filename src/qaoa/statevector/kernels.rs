@@ -1,0 +1,381 @@
+//! What is done to one row or one tile while it is in cache.
+
+use std::f64::consts::TAU;
+
+use super::super::simd::Kernel;
+use super::energies::{Energies, Row};
+use super::layout::{Amplitudes, Layout, Part};
+use super::vector::Vector;
+use super::walsh;
+
+/// `e^{−iγE}` over the low qubits alone; `e^{+iγE}` for a negative γ.
+#[derive(Debug, Clone)]
+pub(super) struct Phases<V> {
+    gamma: f64,
+    re: Vec<V>,
+    im: Vec<V>,
+}
+
+fn cis(angle: f64) -> (f64, f64) {
+    let (sin, cos) = (angle % TAU).sin_cos();
+    (cos, sin)
+}
+
+impl<V: Vector> Phases<V> {
+    pub(super) fn new(low_energies: &[f64], gamma: f64) -> Self {
+        let chunks = low_energies.chunks_exact(V::LANES);
+        Self {
+            gamma,
+            re: chunks.clone().map(|e| V::from_fn(|lane| cis(-gamma * e[lane]).0)).collect(),
+            im: chunks.map(|e| V::from_fn(|lane| cis(-gamma * e[lane]).1)).collect(),
+        }
+    }
+
+    /// The phases that the high bits of a row add: doubled bit by bit.
+    #[inline(always)]
+    fn row(&self, row: &Row, (re, im): (&mut [V], &mut [V])) {
+        let within = V::LANES.trailing_zeros() as usize;
+        let (inner, outer) = row.fields.split_at(within);
+        let outer_sum: f64 = outer.iter().sum();
+        let angle = |lane: usize| {
+            let signed = inner.iter().enumerate();
+            let fields = signed.map(|(bit, f)| if lane >> bit & 1 == 0 { *f } else { -f });
+            -self.gamma * (row.constant + outer_sum + fields.sum::<f64>())
+        };
+        re[0] = V::from_fn(|lane| cis(angle(lane)).0);
+        im[0] = V::from_fn(|lane| cis(angle(lane)).1);
+        for (bit, field) in outer.iter().enumerate() {
+            let (cos, sin) = cis(2.0 * self.gamma * field);
+            let (cos, sin) = (V::splat(cos), V::splat(sin));
+            let (re_low, re_high) = re[..2 << bit].split_at_mut(1 << bit);
+            let (im_low, im_high) = im[..2 << bit].split_at_mut(1 << bit);
+            let low = re_low.iter().zip(im_low.iter());
+            for ((x, y), (re, im)) in low.zip(re_high.iter_mut().zip(im_high)) {
+                *re = *x * cos - *y * sin;
+                *im = *x * sin + *y * cos;
+            }
+        }
+    }
+
+    /// Multiplies one row of amplitudes by the phases of the low qubits and those of the row.
+    #[inline(always)]
+    fn apply(&self, (row_re, row_im): (&[V], &[V]), part: &mut Part<'_, V>) {
+        let low = self.re.iter().zip(&self.im);
+        let phases = low.zip(row_re.iter().zip(row_im));
+        for (((a, b), (c, d)), (x, y)) in phases.zip(part.re.iter_mut().zip(part.im.iter_mut())) {
+            let (re, im) = (*a * *c - *b * *d, *a * *d + *b * *c);
+            (*x, *y) = (*x * re - *y * im, *x * im + *y * re);
+        }
+    }
+}
+
+/// The mixer's eigenvalues by number of ones, divided by 2ⁿ for a transform there and back.
+#[derive(Debug, Clone)]
+pub(super) struct Mixer {
+    by_ones: Vec<(f64, f64)>,
+}
+
+impl Mixer {
+    pub(super) fn new(qubits: usize, beta: f64) -> Self {
+        let scale = 0.5_f64.powi(qubits as i32);
+        let eigenvalue = |ones: usize| cis(-beta * (qubits as f64 - 2.0 * ones as f64));
+        let scaled = |(cos, sin): (f64, f64)| (cos * scale, sin * scale);
+        Self { by_ones: (0..=qubits).map(|ones| scaled(eigenvalue(ones))).collect() }
+    }
+
+    /// The factors of one tile's columns for each number of ones among the high bits.
+    #[inline(always)]
+    fn columns<V: Vector>(&self, layout: &Layout, tile: usize) -> Vec<(V, V)> {
+        let mut factors = Vec::with_capacity((layout.high + 1) * layout.width);
+        for ones in 0..=layout.high {
+            for vector in 0..layout.width {
+                let start = (tile * layout.width + vector) * V::LANES;
+                let at = |lane: usize| self.by_ones[ones + (start + lane).count_ones() as usize];
+                factors.push((V::from_fn(|lane| at(lane).0), V::from_fn(|lane| at(lane).1)));
+            }
+        }
+        factors
+    }
+}
+
+#[inline(always)]
+fn scale_tile<V: Vector>(factors: &[(V, V)], layout: &Layout, part: &mut Part<'_, V>) {
+    let width = layout.width;
+    let rows = part.re.chunks_exact_mut(width).zip(part.im.chunks_exact_mut(width));
+    for (row, (re, im)) in rows.enumerate() {
+        let ones = row.count_ones() as usize;
+        let factors = &factors[ones * width..(ones + 1) * width];
+        for ((x, y), (c, s)) in re.iter_mut().zip(im).zip(factors) {
+            (*x, *y) = (*x * *c - *y * *s, *x * *s + *y * *c);
+        }
+    }
+}
+
+/// The equal superposition after the first phase, transformed for the mixer.
+pub(super) struct First<'a, V> {
+    pub(super) energies: &'a Energies,
+    pub(super) layout: &'a Layout,
+    pub(super) phases: &'a Phases<V>,
+    pub(super) row: usize,
+    pub(super) out: Part<'a, V>,
+}
+
+impl<V: Vector> Kernel for First<'_, V> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { energies, layout, phases, row, mut out } = self;
+        let (mut re, mut im) = (vec![V::ZERO; layout.row], vec![V::ZERO; layout.row]);
+        phases.row(&energies.row(row), (&mut re, &mut im));
+        out.re.fill(V::splat(0.5_f64.powi(layout.qubits() as i32).sqrt()));
+        out.im.fill(V::ZERO);
+        phases.apply((&re, &im), &mut out);
+        walsh::forward(out.re);
+        walsh::forward(out.im);
+    }
+}
+
+/// One mixer on a tile.
+pub(super) struct Mix<'a, V> {
+    pub(super) layout: &'a Layout,
+    pub(super) mixer: &'a Mixer,
+    pub(super) tile: usize,
+    pub(super) from: &'a Amplitudes<V>,
+    pub(super) out: Part<'a, V>,
+}
+
+impl<V: Vector> Kernel for Mix<'_, V> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { layout, mixer, tile, from, mut out } = self;
+        let factors = mixer.columns::<V>(layout, tile);
+        transformed_tile(layout, from, tile, &mut out);
+        scale_tile(&factors, layout, &mut out);
+        walsh::columns(out.re, layout.width);
+        walsh::columns(out.im, layout.width);
+    }
+}
+
+#[inline(always)]
+fn transformed_tile<V: Vector>(
+    layout: &Layout,
+    from: &Amplitudes<V>,
+    tile: usize,
+    out: &mut Part<'_, V>,
+) {
+    layout.gather_tile(&from.re, tile, out.re);
+    layout.gather_tile(&from.im, tile, out.im);
+    walsh::columns(out.re, layout.width);
+    walsh::columns(out.im, layout.width);
+}
+
+/// A tile of amplitudes, transformed for the mixer.
+pub(super) struct Spectrum<'a, V> {
+    pub(super) layout: &'a Layout,
+    pub(super) tile: usize,
+    pub(super) from: &'a Amplitudes<V>,
+    pub(super) out: Part<'a, V>,
+}
+
+impl<V: Vector> Kernel for Spectrum<'_, V> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(mut self) {
+        transformed_tile(self.layout, self.from, self.tile, &mut self.out);
+    }
+}
+
+/// Takes a mixer off the adjoint's tile and the state's (transformed already). Returns Im⟨λ|ΣX|ψ⟩.
+pub(super) struct Unmix<'a, V> {
+    pub(super) layout: &'a Layout,
+    /// With the sign of β changed.
+    pub(super) mixer: &'a Mixer,
+    pub(super) tile: usize,
+    pub(super) from: &'a Amplitudes<V>,
+    pub(super) adjoint: Part<'a, V>,
+    pub(super) state: Part<'a, V>,
+}
+
+impl<V: Vector> Kernel for Unmix<'_, V> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        let Self { layout, mixer, tile, from, mut adjoint, mut state } = self;
+        let factors = mixer.columns::<V>(layout, tile);
+        transformed_tile(layout, from, tile, &mut adjoint);
+        let (width, qubits) = (layout.width, layout.qubits());
+        let mut total = 0.0;
+        for vector in 0..width {
+            let start = (tile * width + vector) * V::LANES;
+            let among_low = V::from_fn(|lane| f64::from((start + lane).count_ones()));
+            let mut sum = V::ZERO;
+            for row in 0..layout.rows() {
+                let at = row * width + vector;
+                let (x, y) = (state.re[at], state.im[at]);
+                let (u, v) = (adjoint.re[at], adjoint.im[at]);
+                let ones = V::splat(f64::from(row.count_ones())) + among_low;
+                sum += (V::splat(qubits as f64) - ones - ones) * (u * y - v * x);
+            }
+            total += sum.sum();
+        }
+        for part in [&mut adjoint, &mut state] {
+            scale_tile(&factors, layout, part);
+            walsh::columns(part.re, width);
+            walsh::columns(part.im, width);
+        }
+        total * 0.5_f64.powi(qubits as i32)
+    }
+}
+
+#[inline(always)]
+fn plain_row<V: Vector>(layout: &Layout, from: &Amplitudes<V>, row: usize, out: &mut Part<'_, V>) {
+    layout.gather_row(&from.re, row, out.re);
+    layout.gather_row(&from.im, row, out.im);
+    walsh::backward(out.re);
+    walsh::backward(out.im);
+}
+
+/// The amplitudes of a row, out of the mixer's transform.
+pub(super) struct Plain<'a, V> {
+    pub(super) layout: &'a Layout,
+    pub(super) row: usize,
+    pub(super) from: &'a Amplitudes<V>,
+    pub(super) out: Part<'a, V>,
+}
+
+impl<V: Vector> Kernel for Plain<'_, V> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(mut self) {
+        plain_row(self.layout, self.from, self.row, &mut self.out);
+    }
+}
+
+/// The next phase on a row, from the last mixer to the next.
+pub(super) struct Phase<'a, V> {
+    pub(super) energies: &'a Energies,
+    pub(super) layout: &'a Layout,
+    pub(super) phases: &'a Phases<V>,
+    pub(super) row: usize,
+    pub(super) from: &'a Amplitudes<V>,
+    pub(super) out: Part<'a, V>,
+}
+
+impl<V: Vector> Kernel for Phase<'_, V> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { energies, layout, phases, row, from, mut out } = self;
+        plain_row(layout, from, row, &mut out);
+        let (mut re, mut im) = (vec![V::ZERO; layout.row], vec![V::ZERO; layout.row]);
+        phases.row(&energies.row(row), (&mut re, &mut im));
+        phases.apply((&re, &im), &mut out);
+        walsh::forward(out.re);
+        walsh::forward(out.im);
+    }
+}
+
+/// ⟨ψ|H|ψ⟩ of a row of plain amplitudes.
+pub(super) struct Energy<'a, V> {
+    pub(super) energies: &'a Energies,
+    pub(super) low_energies: &'a [V],
+    pub(super) layout: &'a Layout,
+    pub(super) row: usize,
+    pub(super) state: (&'a [V], &'a [V]),
+}
+
+impl<V: Vector> Kernel for Energy<'_, V> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        let mut energies = vec![V::ZERO; self.layout.row];
+        self.energies.fill(self.row, self.low_energies, &mut energies);
+        let mut sum = V::ZERO;
+        for ((x, y), e) in self.state.0.iter().zip(self.state.1).zip(&energies) {
+            sum += *e * (*x * *x + *y * *y);
+        }
+        sum.sum()
+    }
+}
+
+/// Turns round: λ = Hψ of a row, both transformed for the mixer. Returns ⟨ψ|H|ψ⟩.
+pub(super) struct Turn<'a, V> {
+    pub(super) energies: &'a Energies,
+    pub(super) low_energies: &'a [V],
+    pub(super) layout: &'a Layout,
+    pub(super) row: usize,
+    pub(super) from: &'a Amplitudes<V>,
+    pub(super) state: Part<'a, V>,
+    pub(super) adjoint: Part<'a, V>,
+}
+
+impl<V: Vector> Kernel for Turn<'_, V> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        let Self { energies, low_energies, layout, row, from, mut state, adjoint } = self;
+        plain_row(layout, from, row, &mut state);
+        energies.fill(row, low_energies, adjoint.im);
+        let mut sum = V::ZERO;
+        let there = adjoint.re.iter_mut().zip(adjoint.im.iter_mut());
+        for ((x, y), (u, v)) in state.re.iter().zip(state.im.iter()).zip(there) {
+            let energy = *v;
+            (*u, *v) = (energy * *x, energy * *y);
+            sum += *x * *u + *y * *v;
+        }
+        for block in [state.re, state.im, adjoint.re, adjoint.im] {
+            walsh::forward(block);
+        }
+        sum.sum()
+    }
+}
+
+/// Takes a phase off the adjoint's row and the state's (plain already), and transforms both for the
+/// mixer before it, if there is one. Returns Im⟨λ|H|ψ⟩.
+pub(super) struct Unphase<'a, V> {
+    pub(super) energies: &'a Energies,
+    pub(super) low_energies: &'a [V],
+    pub(super) layout: &'a Layout,
+    /// With the sign of γ changed; none before the first layer.
+    pub(super) phases: Option<&'a Phases<V>>,
+    pub(super) row: usize,
+    pub(super) from: &'a Amplitudes<V>,
+    pub(super) adjoint: Part<'a, V>,
+    pub(super) state: Part<'a, V>,
+}
+
+impl<V: Vector> Kernel for Unphase<'_, V> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        let Self { energies, low_energies, layout, phases, row, from, mut adjoint, mut state } =
+            self;
+        plain_row(layout, from, row, &mut adjoint);
+        let (mut re, mut im) = (vec![V::ZERO; layout.row], vec![V::ZERO; layout.row]);
+        energies.fill(row, low_energies, &mut re);
+        let mut sum = V::ZERO;
+        let there = adjoint.re.iter().zip(adjoint.im.iter());
+        for (((x, y), (u, v)), e) in state.re.iter().zip(state.im.iter()).zip(there).zip(&re) {
+            sum += *e * (*u * *y - *v * *x);
+        }
+        if let Some(phases) = phases {
+            phases.row(&energies.row(row), (&mut re, &mut im));
+            for part in [&mut state, &mut adjoint] {
+                phases.apply((&re, &im), part);
+                walsh::forward(part.re);
+                walsh::forward(part.im);
+            }
+        }
+        sum.sum()
+    }
+}

@@ -1,0 +1,183 @@
+//! The engine for any 2-local Ising problem: all 2ⁿ amplitudes.
+//!
+//! A layer is two passes over memory, each on parts that fit into cache (`layout`): the Walsh–Hadamard
+//! transform of one half of the qubits, the diagonal factor that meets there (the phase of the energies
+//! for plain amplitudes, the mixer's eigenvalues for transformed ones), and the transform back (`walsh`,
+//! `energies`, `kernels`). `evolution` strings the passes together, on all threads of the current rayon
+//! pool; results do not depend on their number.
+
+mod energies;
+mod evolution;
+mod kernels;
+mod layout;
+mod vector;
+mod walsh;
+
+use std::collections::BTreeMap;
+
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+
+use super::angles::Angles;
+use super::bits::Bits;
+use super::engine::{Engine, EngineError, EngineKind, Sample};
+use super::ising::Ising;
+use super::simd::F4;
+use evolution::Evolution;
+use vector::S8;
+
+/// The numbers that amplitudes are made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Precision {
+    /// `f64`.
+    #[default]
+    Double,
+    /// `f32`: half the memory, about six digits.
+    Single,
+}
+
+#[derive(Debug, Clone)]
+enum State {
+    Double(Evolution<F4>),
+    Single(Evolution<S8>),
+}
+
+/// The statevector engine with its problem and workspace.
+#[derive(Debug, Clone)]
+pub struct StatevectorEngine {
+    qubits: usize,
+    state: State,
+    /// The circuit whose final state is held.
+    held: Option<Angles>,
+}
+
+impl StatevectorEngine {
+    /// An engine for `ising` that may use `memory_limit` bytes.
+    ///
+    /// # Errors
+    /// If the state does not fit; nothing has been allocated then.
+    pub fn new(
+        ising: &Ising,
+        precision: Precision,
+        memory_limit: u64,
+    ) -> Result<Self, EngineError> {
+        let qubits = ising.qubits();
+        let needed = Self::memory(qubits, precision);
+        if needed > memory_limit {
+            return Err(EngineError::Memory {
+                engine: EngineKind::Statevector,
+                qubits,
+                needed,
+                available: memory_limit,
+            });
+        }
+        let state = match precision {
+            Precision::Double => State::Double(Evolution::new(ising)),
+            Precision::Single => State::Single(Evolution::new(ising)),
+        };
+        Ok(Self { qubits, state, held: None })
+    }
+
+    /// Bytes needed for `qubits`: the state, its adjoint, and one more to write the next layer to.
+    #[must_use]
+    pub fn memory(qubits: usize, precision: Precision) -> u64 {
+        let (amplitudes, bytes) = match precision {
+            Precision::Double => (Evolution::<F4>::amplitudes(qubits), 16),
+            Precision::Single => (Evolution::<S8>::amplitudes(qubits), 8),
+        };
+        amplitudes.saturating_mul(3 * bytes)
+    }
+
+    fn hold(&mut self, angles: &Angles) {
+        if self.held.as_ref() != Some(angles) {
+            match &mut self.state {
+                State::Double(evolution) => evolution.run(angles),
+                State::Single(evolution) => evolution.run(angles),
+            }
+            self.held = Some(angles.clone());
+        }
+    }
+
+    /// The probability of one basis state of the held state, dummy qubits included.
+    fn basis_probability(&self, index: usize) -> f64 {
+        match &self.state {
+            State::Double(evolution) => evolution.probability(index),
+            State::Single(evolution) => evolution.probability(index),
+        }
+    }
+
+    /// Number of basis states, dummy qubits included.
+    fn basis_states(&self) -> usize {
+        let amplitudes = match self.state {
+            State::Double(_) => Evolution::<F4>::amplitudes(self.qubits),
+            State::Single(_) => Evolution::<S8>::amplitudes(self.qubits),
+        };
+        amplitudes as usize
+    }
+}
+
+impl Engine for StatevectorEngine {
+    fn kind(&self) -> EngineKind {
+        EngineKind::Statevector
+    }
+
+    fn qubits(&self) -> usize {
+        self.qubits
+    }
+
+    fn expectation(&mut self, angles: &Angles) -> Result<f64, EngineError> {
+        self.hold(angles);
+        Ok(match &self.state {
+            State::Double(evolution) => evolution.energy(),
+            State::Single(evolution) => evolution.energy(),
+        })
+    }
+
+    fn expectation_and_gradient(&mut self, angles: &Angles) -> Result<(f64, Angles), EngineError> {
+        self.held = None;
+        Ok(match &mut self.state {
+            State::Double(evolution) => evolution.gradient(angles),
+            State::Single(evolution) => evolution.gradient(angles),
+        })
+    }
+
+    fn sample(
+        &mut self,
+        angles: &Angles,
+        shots: u32,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<Vec<Sample>, EngineError> {
+        self.hold(angles);
+        let mut draws: Vec<f64> = (0..shots).map(|_| rng.random()).collect();
+        draws.sort_by(f64::total_cmp);
+        // Rounding may leave the sum of all probabilities a little off 1.
+        let total: f64 = (0..self.basis_states()).map(|index| self.basis_probability(index)).sum();
+        let mask = (1_usize << self.qubits) - 1;
+        let mut counts = BTreeMap::new();
+        let (mut reached, mut index, mut likely) = (self.basis_probability(0), 0, 0);
+        for draw in draws {
+            while reached <= draw * total && index + 1 < self.basis_states() {
+                index += 1;
+                let probability = self.basis_probability(index);
+                reached += probability;
+                if probability > 0.0 {
+                    likely = index;
+                }
+            }
+            *counts.entry(Bits::from_index(self.qubits, likely & mask)).or_insert(0) += 1;
+        }
+        Ok(counts.into_iter().map(|(bits, count)| Sample { bits, count }).collect())
+    }
+
+    fn probability(&mut self, angles: &Angles, bits: &Bits) -> Result<f64, EngineError> {
+        let (found, expected) = (bits.len(), self.qubits);
+        if found != expected {
+            return Err(EngineError::BitsLength { found, expected });
+        }
+        self.hold(angles);
+        let index =
+            bits.iter().enumerate().map(|(qubit, bit)| usize::from(bit) << qubit).sum::<usize>();
+        let dummies = self.basis_states() >> self.qubits;
+        Ok((0..dummies).map(|dummy| self.basis_probability(index | dummy << self.qubits)).sum())
+    }
+}
