@@ -16,3 +16,6 @@ pub mod summary;
 mod text;
 
 pub use run::Run;
+
+#[cfg(test)]
+mod samples;

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use crate::mission::Leg;
 use crate::mission::legs::{LegKind, ReturnTo, number as item_number};
+use crate::replan::LegVerdict;
 use crate::units::Metres;
 
 /// The width that everything fits into.
@@ -101,6 +102,18 @@ pub(super) fn leg_label(leg: &Leg) -> String {
     }
 }
 
+/// What is wrong with a leg, as a sentence.
+pub(super) fn finding(verdict: &LegVerdict) -> String {
+    let name = verdict.leg.name();
+    match &verdict.blocker {
+        None => format!("The {name} is clear."),
+        Some((region, true)) => format!("The {name} meets {region}."),
+        Some((region, false)) => {
+            format!("The {name} comes within {} of {region}.", clearance(verdict.clearance))
+        }
+    }
+}
+
 /// A table: the first column to the left, the others to the right, two spaces between them.
 pub(super) struct Table {
     rows: Vec<Vec<String>>,
@@ -135,5 +148,53 @@ impl Table {
             out.push_str(line.trim_end());
             out.push('\n');
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clearance_is_never_rounded_up() {
+        assert_eq!(clearance(Metres(4.999)), "4.99 m");
+        assert_eq!(clearance(Metres(5.0)), "5.00 m");
+        assert_eq!(clearance(Metres(0.29)), "0.29 m");
+        assert_eq!(clearance(Metres::INFINITY), "-");
+    }
+
+    #[test]
+    fn a_number_stays_on_the_line_of_its_unit() {
+        let mut out = String::new();
+        push_wrapped(&mut out, &format!("{} {}", "x".repeat(75), unbroken(Metres(5.0))), 2);
+        assert_eq!(out, format!("{}\n  5.00 m\n", "x".repeat(75)));
+    }
+
+    #[test]
+    fn a_word_longer_than_a_line_is_broken() {
+        let mut out = String::new();
+        push_wrapped(&mut out, &"y".repeat(100), 4);
+        assert_eq!(out, format!("{}\n    {}\n", "y".repeat(80), "y".repeat(20)));
+    }
+
+    #[test]
+    fn control_characters_do_not_reach_the_terminal() {
+        assert_eq!(plain("a\u{1b}[2Jb\u{9b}c"), "a\u{fffd}[2Jb\u{fffd}c");
+    }
+
+    #[test]
+    fn a_change_without_a_length_to_compare_is_left_out() {
+        assert_eq!(change(Metres(200.0), Metres(213.0)), "+6.5 %");
+        assert_eq!(change(Metres::ZERO, Metres::ZERO), "-");
+        assert_eq!(change(Metres::ZERO, Metres(3.0)), "-");
+    }
+
+    #[test]
+    fn columns_are_as_wide_as_their_widest_cell() {
+        let mut table = Table::new(["a", "value"]);
+        table.row(["longer".to_owned(), "1".to_owned()]);
+        let mut out = String::new();
+        table.push_to(&mut out);
+        assert_eq!(out, "a       value\nlonger      1\n");
     }
 }

@@ -2,11 +2,11 @@
 
 use svg::node::element::{Circle, Group, Path};
 
+use super::map::{shows_outside, visible};
 use super::places::{goal_mark, start_mark};
 use super::scene::Scene;
 use super::text;
-use super::view::{Rect, px};
-use crate::airspace::Outline;
+use super::view::{Rect, View, px};
 use crate::geodesy::Xy;
 use crate::planner::candidates::Source;
 use crate::report::run::Run;
@@ -20,7 +20,7 @@ const OUTSIDE: &str = "#d9dde2";
 /// The height of an entry.
 const ROW: f64 = 21.5;
 
-pub(super) fn legend(scene: &Scene<'_>, run: &Run<'_>, rect: Rect) -> Group {
+pub(super) fn legend(scene: &Scene<'_>, view: &View, run: &Run<'_>, rect: Rect) -> Group {
     let mut list = List { group: Group::new(), x: rect.x, y: rect.y + 16.0 };
     list.title("Legend");
     let line = |class: &str| Path::new().set("d", "M0 0h34").set("class", class);
@@ -52,16 +52,15 @@ pub(super) fn legend(scene: &Scene<'_>, run: &Run<'_>, rect: Rect) -> Group {
             list.entry(line(class), name);
         }
     }
-    let is_solid = |o: &Outline| matches!(o, Outline::Solid(_) | Outline::SolidDisc { .. });
     let buffer = run.options.settings.buffer;
-    if scene.outlines.iter().any(is_solid) {
+    if visible(scene, view, 0.0).next().is_some() {
         let swatch = Group::new()
             .add(box_(RIM, 34.0, 16.0))
             .add(box_(BUFFER, 32.0, 14.0))
             .add(box_(OBSTACLE, 20.0, 6.0));
         list.entry(swatch, &format!("obstacle and its buffer of {buffer}"));
     }
-    if scene.has_inclusion() {
+    if shows_outside(scene, view) {
         let swatch = Group::new()
             .add(box_(OUTSIDE, 34.0, 16.0))
             .add(Path::new().set("d", "M0 8h34").set("class", "fence"));

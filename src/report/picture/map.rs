@@ -21,8 +21,8 @@ pub(super) fn map(scene: &Scene<'_>, view: &View) -> Group {
         .add(path(obstacles(scene, view, 0.0), "obstacle"))
         .add(path(inclusions(scene, view).concat(), "fence"))
         .add(candidates(scene, view))
-        .add(path(lines(&scene.old, view), "old"))
         .add(path(lines(&scene.new, view), "casing"))
+        .add(path(lines(&scene.old, view), "old"))
         .add(path(lines(&scene.new, view), "new"))
         .add(places(scene, view));
     Group::new()
@@ -38,7 +38,7 @@ pub(super) fn path(data: String, class: &str) -> Path {
 }
 
 /// The obstacles that can be seen, with so many metres around them.
-fn visible<'a>(
+pub(super) fn visible<'a>(
     scene: &'a Scene<'_>,
     view: &'a View,
     grown: f64,
@@ -95,6 +95,29 @@ fn outside(scene: &Scene<'_>, view: &View) -> Group {
     let panel = format!("M{} {}h{}v{}h-{}Z", px(x), px(y), px(width), px(height), px(width));
     let shaded = inclusions(scene, view).into_iter().map(|ring| panel.clone() + &ring);
     shaded.fold(Group::new(), |group, data| group.add(path(data, "outside")))
+}
+
+/// Whether any of what inclusions forbid is in the panel.
+pub(super) fn shows_outside(scene: &Scene<'_>, view: &View) -> bool {
+    let meets = |ring: &[Xy]| {
+        let ends = ring.iter().zip(ring.iter().cycle().skip(1));
+        ends.into_iter().any(|(&a, &b)| view.panel.meets(view.at(a), view.at(b)))
+    };
+    if let Some(union) = scene.union {
+        let mut rings =
+            union.iter().flat_map(|p| std::iter::once(p.exterior()).chain(p.interiors()));
+        return rings.any(|ring| meets(&ring.0));
+    }
+    scene.outlines.iter().any(|outline| match outline {
+        Outline::Zone(ring) => meets(ring),
+        Outline::ZoneDisc { centre, radius } => {
+            let at = view.at(*centre);
+            let far = |low: f64, high: f64, x: f64| (x - low).abs().max((x - high).abs());
+            let (panel, radius) = (view.panel, radius * view.scale);
+            far(panel.x, panel.right(), at.x).hypot(far(panel.y, panel.bottom(), at.y)) > radius
+        }
+        Outline::Solid(_) | Outline::SolidDisc { .. } => false,
+    })
 }
 
 fn candidates(scene: &Scene<'_>, view: &View) -> Group {

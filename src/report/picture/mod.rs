@@ -5,11 +5,13 @@
 //! - [`map`]: obstacles, buffers, fences, candidates, old and new route;
 //! - [`places`]: the numbered waypoints, start and goal;
 //! - [`chart`]: axes and curves; [`training`]: the two charts of the QAOA rounds;
+//! - [`findings`]: what is not clear, where a mission was only judged;
 //! - [`legend`]: what the colours mean.
 //!
 //! A mission over several zones is drawn for the zone with the most legs.
 
 mod chart;
+mod findings;
 mod legend;
 mod map;
 mod places;
@@ -18,7 +20,7 @@ mod training;
 mod view;
 
 use svg::Document;
-use svg::node::element::{Group, Rectangle, Style, Text};
+use svg::node::element::{Group, Rectangle, Style, Text, Title};
 
 use super::run::Run;
 use super::text::{change, clearance, count, plain};
@@ -63,8 +65,8 @@ text{font:13px 'Segoe UI',Roboto,Helvetica,Arial,sans-serif;fill:#2b3440}\
 .number{font-size:12px;font-weight:600;fill:#0b3d91;stroke:#fff;stroke-width:3.5;\
 stroke-linejoin:round;paint-order:stroke;text-anchor:middle}\
 .ink{fill:#2b3440}.plate{fill:#fff;fill-opacity:.88}\
-.axis{stroke:#9aa3ad}.tick{stroke:#e3e6ea}.later{fill:none;stroke:#6f86a6;stroke-opacity:.6}\
-.first{fill:none;stroke-width:2.6;stroke-linejoin:round}\
+.axis{stroke:#9aa3ad}.tick{stroke:#e3e6ea}.later{stroke:#6f86a6;stroke-opacity:.6}\
+.later,.first{fill:none}.first{stroke-width:2.6;stroke-linejoin:round}\
 .middle{text-anchor:middle}.end{text-anchor:end}";
 
 /// What a picture is of.
@@ -117,17 +119,23 @@ pub fn picture<'a>(
     let lengths = Rect { x: losses.right() + GAP, width: 330.0, ..losses };
     let key =
         Rect { x: lengths.right() + GAP, width: PAGE - BORDER - GAP - lengths.right(), ..losses };
-    let document = Document::new()
+    let mut document = Document::new()
         .set("viewBox", (0, 0, PAGE as i32, page_height as i32))
         .set("width", PAGE as i32)
         .set("height", page_height as i32)
+        .add(Title::new(plain(title)))
         .add(Style::new(STYLE))
         .add(Rectangle::new().set("width", "100%").set("height", "100%").set("fill", "#fff"))
         .add(header(&subject, run, title))
         .add(map::map(&scene, &view))
-        .add(training::losses(&scene.records, losses))
-        .add(training::lengths(&scene.records, lengths))
-        .add(legend::legend(&scene, run, key));
+        .add(legend::legend(&scene, &view, run, key));
+    document = if subject.after.is_some() {
+        document
+            .add(training::losses(&scene.records, losses))
+            .add(training::lengths(&scene.records, lengths))
+    } else {
+        document.add(findings::findings(subject.before, losses))
+    };
     Ok(format!("{document}\n"))
 }
 
@@ -141,12 +149,13 @@ fn header(subject: &Subject<'_>, run: &Run<'_>, title: &str) -> Group {
             let verdict = if before.is_clear() { "clear" } else { "not clear" };
             vec![verdict.to_owned(), format!("length {}", was.0), format!("clearance {}", was.1)]
         }
-        Some((after, inserted, _)) => {
+        Some((after, inserted, records)) => {
             let rise = change(before.length(), after.length());
             vec![
                 format!("length {} \u{2192} {:.1} ({rise})", was.0, after.length()),
                 format!("clearance {} \u{2192} {}", was.1, clearance(after.clearance())),
                 count(inserted.len(), "new waypoint"),
+                count(records.iter().map(|record| record.rounds.len()).sum(), "QAOA round"),
             ]
         }
     };
@@ -165,4 +174,108 @@ fn header(subject: &Subject<'_>, run: &Run<'_>, title: &str) -> Group {
 /// A line of text.
 fn text(x: f64, y: f64, class: &str, content: &str) -> Text {
     Text::new(content).set("x", view::px(x)).set("y", view::px(y)).set("class", class)
+}
+
+#[cfg(test)]
+mod tests {
+    use quick_xml::events::Event;
+    use quick_xml::reader::Reader;
+
+    use super::*;
+    use crate::replan::Options;
+    use crate::report::samples::{self, BARN, POND, YARD};
+
+    /// The classes of all elements and all texts of a well-formed document.
+    fn read(svg: &str) -> (Vec<String>, Vec<String>) {
+        let mut reader = Reader::from_str(svg);
+        let (mut classes, mut texts, mut depth) = (Vec::new(), Vec::new(), 0);
+        loop {
+            let event = reader.read_event().unwrap();
+            match &event {
+                Event::Start(element) | Event::Empty(element) => {
+                    for attribute in element.attributes() {
+                        let attribute = attribute.unwrap();
+                        let value = String::from_utf8(attribute.value.to_vec()).unwrap();
+                        assert!(!value.contains("NaN") && !value.contains("inf"), "{value}");
+                        if attribute.key.as_ref() == b"class" {
+                            classes.push(value);
+                        }
+                    }
+                }
+                Event::Text(text) => texts.push(text.decode().unwrap().trim().to_owned()),
+                Event::Eof => break,
+                _ => {}
+            }
+            match event {
+                Event::Start(_) => depth += 1,
+                Event::End(_) => depth -= 1,
+                _ => {}
+            }
+        }
+        assert_eq!(depth, 0);
+        (classes, texts)
+    }
+
+    #[test]
+    fn a_plan_is_drawn_with_all_that_the_legend_names() {
+        let options = Options::default();
+        let result = samples::planned(POND, &options);
+        let svg = picture(&result, &samples::run(&options, &[]), "the pond").unwrap();
+        let (classes, texts) = read(&svg);
+        for class in ["obstacle", "buffer", "outside", "fence", "route corners", "old", "new"] {
+            assert!(classes.iter().any(|c| c == class), "{class}");
+        }
+        let marked = |class: &str| classes.iter().filter(|c| *c == class).count();
+        // One of them is the legend's.
+        assert_eq!(marked("inserted"), result.inserted.len() + 1);
+        assert_eq!(marked("first"), 2 * 2 + 2, "two curves for each leg, and their names");
+        for index in &result.inserted {
+            let number = (index + 1).to_string();
+            assert!(texts.contains(&number), "{number}");
+        }
+        for text in ["the pond", "N", "start", "end", "outside of the fence", "new route"] {
+            assert!(texts.iter().any(|t| t == text), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_judged_mission_is_drawn_with_what_is_wrong_with_it() {
+        let options = Options::default();
+        let (verdict, fields) = samples::judged(YARD, &options);
+        let run = samples::run(&options, &[]);
+        let svg = picture(Subject::judged(&verdict, &fields), &run, "yard").unwrap();
+        let (classes, texts) = read(&svg);
+        assert!(classes.iter().any(|class| class == "old"));
+        assert!(!classes.iter().any(|class| class == "inserted"));
+        assert!(texts.iter().any(|text| text.starts_with("The leg from item 1 to item 2 meets")));
+    }
+
+    #[test]
+    fn a_mission_without_fences_and_one_without_items_are_drawn() {
+        let options = Options::default();
+        let run = samples::run(&options, &[]);
+        let result = samples::planned_without_fences(BARN, &options);
+        let (_, texts) = read(&picture(&result, &run, "").unwrap());
+        assert!(texts.iter().any(|text| text == "Every leg is clear"));
+        let nothing = Verdict { legs: Vec::new(), warnings: Vec::new() };
+        read(&picture(Subject::judged(&nothing, &[]), &run, "").unwrap());
+    }
+
+    #[test]
+    fn names_from_outside_cannot_break_out_of_the_text() {
+        let options = Options::default();
+        let result = samples::planned_without_fences(BARN, &options);
+        let title = "</text><script>alert(1)</script>&\u{0}\u{1b}";
+        let svg = picture(&result, &samples::run(&options, &[]), title).unwrap();
+        read(&svg);
+        assert!(!svg.contains("<script"));
+    }
+
+    #[test]
+    fn the_same_plan_gives_the_same_picture() {
+        let options = Options::default();
+        let run = samples::run(&options, &[]);
+        let draw = || picture(&samples::planned(BARN, &options), &run, "barn").unwrap();
+        assert_eq!(draw(), draw());
+    }
 }

@@ -93,12 +93,13 @@ struct Numbers {
 
 impl Numbers {
     fn new(scene: &Scene<'_>, view: &View) -> Self {
-        let around = |at: Xy| Rect { x: at.x - 11.0, y: at.y - 11.0, width: 22.0, height: 22.0 };
+        let around = |at: Xy| Rect { x: at.x - 12.0, y: at.y - 12.0, width: 24.0, height: 24.0 };
         let ends = [scene.start, scene.goal].into_iter().flatten();
+        let edges = scene.new.iter().chain(&scene.old);
         Self {
             panel: view.panel,
             dots: scene.places.iter().map(|place| view.at(place.at)).collect(),
-            edges: scene.new.iter().map(|edge| (view.at(edge.from), view.at(edge.to))).collect(),
+            edges: edges.map(|edge| (view.at(edge.from), view.at(edge.to))).collect(),
             taken: ends.map(|end| around(view.at(end))).collect(),
         }
     }
@@ -134,47 +135,9 @@ impl Numbers {
             height: rect.height + 10.0,
         };
         let dots = self.dots.iter().filter(|dot| near.contains(dot.x, dot.y)).count() as f64;
-        let lines = self.edges.iter().filter(|(a, b)| crosses(rect, *a, *b)).count() as f64;
+        let lines = self.edges.iter().filter(|(a, b)| rect.meets(*a, *b)).count() as f64;
         let out = !self.panel.contains(rect.x, rect.y)
             || !self.panel.contains(rect.right(), rect.bottom());
         30.0 * labels + 12.0 * dots + 6.0 * lines + if out { 100.0 } else { 0.0 }
-    }
-}
-
-/// Whether a line meets a rectangle (Liang and Barsky 1984).
-fn crosses(rect: Rect, a: Xy, b: Xy) -> bool {
-    let (mut enters, mut leaves) = (0.0f64, 1.0f64);
-    let (dx, dy) = (b.x - a.x, b.y - a.y);
-    for (along, room) in [
-        (-dx, a.x - rect.x),
-        (dx, rect.right() - a.x),
-        (-dy, a.y - rect.y),
-        (dy, rect.bottom() - a.y),
-    ] {
-        if along == 0.0 {
-            if room < 0.0 {
-                return false;
-            }
-        } else if along < 0.0 {
-            enters = enters.max(room / along);
-        } else {
-            leaves = leaves.min(room / along);
-        }
-    }
-    enters <= leaves
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_line_crosses_a_rectangle_or_passes_it() {
-        let rect = Rect { x: 0.0, y: 0.0, width: 10.0, height: 4.0 };
-        let at = |x, y| Xy { x, y };
-        assert!(crosses(rect, at(-5.0, 2.0), at(15.0, 3.0)));
-        assert!(crosses(rect, at(5.0, 1.0), at(6.0, 2.0)));
-        assert!(!crosses(rect, at(-5.0, 5.0), at(15.0, 5.0)));
-        assert!(!crosses(rect, at(-5.0, 2.0), at(-1.0, 2.0)));
     }
 }

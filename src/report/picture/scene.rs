@@ -13,8 +13,14 @@ use crate::replan::{Field, LegRecord, LegVerdict, Verdict};
 /// The share of the route's extent that is shown around it.
 const AROUND: f64 = 0.06;
 
-/// An inclusion is shown whole where it is at most this many times as wide and high as the route.
-const FENCE_SHOWN: f64 = 1.6;
+/// What is near to the route is shown whole as long as that makes the map at most this many times
+/// as long as the route: where there is a new route, and where what bars the way matters more.
+const WIDENED: f64 = 1.4;
+const WIDENED_JUDGED: f64 = 2.0;
+
+/// The least height of the map over its width, and its least width over its height: what is
+/// visible beside a route that is a straight line.
+const SLIM: f64 = 0.37;
 
 /// A straight leg.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -118,17 +124,7 @@ impl<'a> Scene<'a> {
         all.filter(move |candidate| candidate.source == source).map(|c| c.points.as_slice())
     }
 
-    /// Whether anything is forbidden by an inclusion.
-    pub(super) fn has_inclusion(&self) -> bool {
-        self.union.is_some() || self.zones().next().is_some()
-    }
-
-    fn zones(&self) -> impl Iterator<Item = &'a Outline> + '_ {
-        let is_zone = |o: &&Outline| matches!(o, Outline::Zone(_) | Outline::ZoneDisc { .. });
-        self.outlines.iter().filter(is_zone)
-    }
-
-    /// The corners of what has to be seen, never without area.
+    /// The corners of what is shown, never without area.
     pub(super) fn extent(&self) -> (Xy, Xy) {
         let mut extent = Extent::default();
         for edge in self.old.iter().chain(&self.new) {
@@ -143,25 +139,22 @@ impl<'a> Scene<'a> {
             extent.add(place.at - reach);
             extent.add(place.at + reach);
         }
-        let route = extent.grown(2.0 * self.margin);
-        let mut whole = route;
-        for zone in self.zones() {
-            match zone {
-                Outline::Zone(ring) => ring.iter().for_each(|&point| whole.add(point)),
-                Outline::ZoneDisc { centre, radius } => {
-                    whole.add(*centre - Xy { x: *radius, y: *radius });
-                    whole.add(*centre + Xy { x: *radius, y: *radius });
+        let route = extent.grown(2.0 * self.margin).at_least(SLIM);
+        // What is near, and for a judged mission what is near to that.
+        let (passes, widened) = if self.is_planned { (1, WIDENED) } else { (2, WIDENED_JUDGED) };
+        let limit = widened * route.longer();
+        let mut shown = route;
+        for _ in 0..passes {
+            let near = shown;
+            for outline in self.outlines.iter().map(Extent::of).filter(|o| o.overlaps(&near)) {
+                let wider = shown.with(&outline.grown(self.margin));
+                if wider.longer() <= limit {
+                    shown = wider;
                 }
-                Outline::Solid(_) | Outline::SolidDisc { .. } => {}
             }
         }
-        let (shown, is_whole) = (route.size(), whole.size());
-        let longer = shown.x.max(shown.y);
-        let fits = is_whole.x.max(is_whole.y) <= FENCE_SHOWN * longer;
-        let chosen = if fits { whole } else { route };
-        let size = chosen.size();
-        let chosen = chosen.grown(AROUND * size.x.max(size.y));
-        (chosen.low, chosen.high)
+        let shown = shown.grown(AROUND * route.longer());
+        (shown.low, shown.high)
     }
 }
 
@@ -185,8 +178,35 @@ impl Extent {
         self.high = Xy { x: self.high.x.max(point.x), y: self.high.y.max(point.y) };
     }
 
-    fn size(&self) -> Xy {
-        self.high - self.low
+    fn of(outline: &Outline) -> Self {
+        let mut extent = Self::default();
+        match outline {
+            Outline::Solid(rings) => rings.iter().flatten().for_each(|&point| extent.add(point)),
+            Outline::Zone(ring) => ring.iter().for_each(|&point| extent.add(point)),
+            &Outline::SolidDisc { centre, radius } | &Outline::ZoneDisc { centre, radius } => {
+                let reach = Xy { x: radius, y: radius };
+                extent.add(centre - reach);
+                extent.add(centre + reach);
+            }
+        }
+        extent
+    }
+
+    fn longer(&self) -> f64 {
+        (self.high.x - self.low.x).max(self.high.y - self.low.y)
+    }
+
+    fn overlaps(&self, other: &Self) -> bool {
+        self.low.x < other.high.x
+            && other.low.x < self.high.x
+            && self.low.y < other.high.y
+            && other.low.y < self.high.y
+    }
+
+    fn with(mut self, other: &Self) -> Self {
+        self.add(other.low);
+        self.add(other.high);
+        self
     }
 
     /// With some metres around it, at least 10 m; around the origin where it is empty.
@@ -196,6 +216,15 @@ impl Extent {
         if self.low.x > self.high.x {
             return Self { low: -by, high: by };
         }
+        Self { low: self.low - by, high: self.high + by }
+    }
+
+    /// No side shorter than a share of the other.
+    fn at_least(self, share: f64) -> Self {
+        let least = share * self.longer();
+        let size = self.high - self.low;
+        let lacking = |length: f64| (least - length).max(0.0) / 2.0;
+        let by = Xy { x: lacking(size.x), y: lacking(size.y) };
         Self { low: self.low - by, high: self.high + by }
     }
 }

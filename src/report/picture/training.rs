@@ -5,8 +5,7 @@ use svg::node::element::{Group, Path};
 
 use super::chart::{Axis, Chart};
 use super::text;
-use super::view::Rect;
-use crate::planner::polyline::distance;
+use super::view::{Rect, px};
 use crate::planner::rounds::Round;
 use crate::replan::LegRecord;
 use crate::report::text::{count, leg_label};
@@ -67,70 +66,71 @@ fn coloured<'a>(
     records.iter().copied().zip(COLOURS.into_iter().cycle())
 }
 
-/// Which colour is which leg, in the upper right corner.
+/// Which colour is which leg, in the lower right corner.
 fn names(records: &[&LegRecord], chart: &Chart, later: usize) -> Group {
-    let area = chart.area();
-    let mut group = Group::new();
-    let mut y = area.y + 12.0;
-    let mut entry = |group: Group, name: &str, class: &str, colour: Option<&str>| {
-        let x = area.right() - 20.0;
-        let mut swatch = Path::new().set("d", format!("M{x} {}h20", y - 4.0)).set("class", class);
-        if let Some(colour) = colour {
-            swatch = swatch.set("stroke", colour);
-        }
-        let group = group.add(swatch).add(text(x - 6.0, y, "small end", name));
-        y += 16.0;
-        group
-    };
-    for (record, colour) in coloured(records).take(NAMED) {
-        let name = format!("leg {}, first round", leg_label(&record.leg));
-        group = entry(group, &name, "first", Some(colour));
-    }
+    let mut entries: Vec<(String, &str, &str)> = coloured(records)
+        .take(NAMED)
+        .map(|(record, colour)| {
+            (format!("leg {}, first round", leg_label(&record.leg)), "first", colour)
+        })
+        .collect();
     if records.len() > NAMED {
-        let name = format!("and {} more", count(records.len() - NAMED, "leg"));
-        group = entry(group, &name, "none", None);
+        let more = count(records.len() - NAMED, "more leg");
+        entries.push((more, "none", "none"));
     }
     if later > 0 {
-        let name = count(later, "later round");
-        group = entry(group, &name, "later", None);
+        entries.push((count(later, "later round"), "later", "#6f86a6"));
+    }
+    let area = chart.area();
+    let (width, height) = (190.0, 16.0 * entries.len() as f64 + 6.0);
+    let plate = Rect { x: area.right() - width, y: area.bottom() - height - 2.0, width, height };
+    let mut group = Group::new().add(plate.element().set("class", "plate"));
+    let x = area.right() - 24.0;
+    for (k, (name, class, colour)) in entries.iter().enumerate() {
+        let y = plate.y + 14.0 + 16.0 * k as f64;
+        let swatch = Path::new().set("d", format!("M{} {}h20", px(x), px(y - 4.0)));
+        group = group.add(swatch.set("class", *class).set("stroke", *colour)).add(text(
+            x - 6.0,
+            y,
+            "small end",
+            name,
+        ));
     }
     group
 }
 
-/// The length of each leg's path after each round, as a detour over the straight line.
+/// The length of each leg's path after each round against that of the candidate it began with.
 pub(super) fn lengths(records: &[&LegRecord], rect: Rect) -> Group {
-    let title = "Detour over the straight line (%)";
-    let detours: Vec<Vec<f64>> = records.iter().map(|record| detours(record)).collect();
-    let all = || detours.iter().flatten().copied();
-    let most = detours.iter().map(Vec::len).max().unwrap_or(0);
-    let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max));
-    if most == 0 || !low.is_finite() {
+    let title = "Path length against the best candidate (m)";
+    let gains: Vec<Vec<f64>> = records.iter().map(|record| gains(record)).collect();
+    let most = gains.iter().map(Vec::len).max().unwrap_or(0);
+    if most == 0 {
         return nothing(title, rect);
     }
-    let room = (0.08 * (high - low)).max(0.02);
+    let all = || gains.iter().flatten().copied();
+    let (low, high) = (all().fold(0.0, f64::min), all().fold(0.0, f64::max));
+    let room = (0.06 * (high - low)).max(0.05);
     let chart = Chart::new(
         rect,
         Axis::linear(0.0, (most - 1).max(1) as f64),
-        Axis::linear((low - room).max(0.0), high + room),
+        Axis::linear(low - room, high + room),
     );
     let mut group = chart.axes(title, "after round (0: the best candidate)");
-    for (detours, colour) in detours.iter().zip(COLOURS.into_iter().cycle()) {
-        let data = chart.curve(detours.iter().enumerate().map(|(k, &d)| (k as f64, d)));
+    for (gains, colour) in gains.iter().zip(COLOURS.into_iter().cycle()) {
+        let data = chart.curve(gains.iter().enumerate().map(|(k, &gain)| (k as f64, gain)));
         let path = Path::new().set("d", data).set("class", "first").set("stroke", colour);
         group = group.add(path);
     }
     group
 }
 
-/// The detour of the first candidate and after each round, percent.
-fn detours(record: &LegRecord) -> Vec<f64> {
-    let straight = match (record.points.first(), record.points.last()) {
-        (Some(&start), Some(&goal)) => distance(start, goal),
-        _ => return Vec::new(),
+/// How much longer the path is than the first candidate, before and after each round, metres.
+fn gains(record: &LegRecord) -> Vec<f64> {
+    let Some(first) = record.candidates.first().map(|candidate| candidate.length) else {
+        return Vec::new();
     };
-    let first = record.candidates.first().map(|candidate| candidate.length);
-    let lengths = first.into_iter().chain(record.rounds.iter().map(|round| round.length));
-    lengths.map(|length| (length / straight - 1.0) * 100.0).filter(|d| d.is_finite()).collect()
+    let rounds = record.rounds.iter().map(|round| round.length - first);
+    std::iter::once(0.0).chain(rounds).collect()
 }
 
 fn nothing(title: &str, rect: Rect) -> Group {

@@ -36,6 +36,29 @@ impl Rect {
             && other.y < self.bottom()
     }
 
+    /// Whether a line meets the rectangle (Liang and Barsky 1984).
+    pub(super) fn meets(self, a: Xy, b: Xy) -> bool {
+        let (mut enters, mut leaves) = (0.0f64, 1.0f64);
+        let (dx, dy) = (b.x - a.x, b.y - a.y);
+        for (along, room) in [
+            (-dx, a.x - self.x),
+            (dx, self.right() - a.x),
+            (-dy, a.y - self.y),
+            (dy, self.bottom() - a.y),
+        ] {
+            if along == 0.0 {
+                if room < 0.0 {
+                    return false;
+                }
+            } else if along < 0.0 {
+                enters = enters.max(room / along);
+            } else {
+                leaves = leaves.min(room / along);
+            }
+        }
+        enters <= leaves
+    }
+
     /// The rectangle as an SVG element.
     pub(super) fn element(self) -> svg::node::element::Rectangle {
         svg::node::element::Rectangle::new()
@@ -132,4 +155,54 @@ impl View {
 fn push(data: &mut String, command: char, at: Xy) {
     // Writing to a string does not fail.
     let _ = write!(data, "{command}{} {}", px(at.x), px(at.y));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(x: f64, y: f64) -> Xy {
+        Xy { x, y }
+    }
+
+    #[test]
+    fn a_line_meets_a_rectangle_or_passes_it() {
+        let rect = Rect { x: 0.0, y: 0.0, width: 10.0, height: 4.0 };
+        assert!(rect.meets(at(-5.0, 2.0), at(15.0, 3.0)));
+        assert!(rect.meets(at(5.0, 1.0), at(6.0, 2.0)));
+        assert!(!rect.meets(at(-5.0, 5.0), at(15.0, 5.0)));
+        assert!(!rect.meets(at(-5.0, 2.0), at(-1.0, 2.0)));
+    }
+
+    #[test]
+    fn a_view_keeps_proportions_and_has_north_up() {
+        let panel = Rect { x: 10.0, y: 20.0, width: 400.0, height: 100.0 };
+        let view = View::new(panel, at(-50.0, -50.0), at(50.0, 50.0));
+        assert_eq!(view.scale, 1.0);
+        assert_eq!(view.at(at(0.0, 50.0)), at(210.0, 20.0));
+        assert_eq!(view.at(at(50.0, -50.0)), at(260.0, 120.0));
+    }
+
+    #[test]
+    fn points_that_look_the_same_are_drawn_once_and_the_last_one_is_kept() {
+        let panel = Rect { x: 0.0, y: 0.0, width: 100.0, height: 100.0 };
+        let view = View::new(panel, at(-50.0, -50.0), at(50.0, 50.0));
+        let line = [at(0.0, 0.0), at(0.01, 0.0), at(10.0, 0.0), at(10.2, 0.0)];
+        assert_eq!(view.line(&line), "M50 50L60 50L60.2 50");
+        assert_eq!(view.line([]), "");
+    }
+
+    #[test]
+    fn what_lies_beside_the_panel_is_not_shown_unless_its_buffer_reaches_it() {
+        let panel = Rect { x: 0.0, y: 0.0, width: 100.0, height: 100.0 };
+        let view = View::new(panel, at(-50.0, -50.0), at(50.0, 50.0));
+        let beside = [at(53.0, 0.0), at(60.0, 5.0)];
+        assert!(!view.shows(&beside, 0.0));
+        assert!(view.shows(&beside, 5.0));
+    }
+
+    #[test]
+    fn numbers_have_one_decimal_at_most_and_no_negative_zero() {
+        assert_eq!([px(12.04), px(-0.01), px(3.25001)], ["12", "0", "3.3"]);
+    }
 }
