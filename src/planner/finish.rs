@@ -1,8 +1,10 @@
 //! The finish: as few waypoints as needed, on the integers that the vehicle will fly, every edge
 //! judged once more against the unsimplified obstacles.
 
+use nalgebra::{Matrix2, Vector2};
+
 use super::leg_space::LegSpace;
-use super::polyline::{cross, distance, length, turn};
+use super::polyline::{distance, length, turn};
 use crate::airspace::RegionId;
 use crate::geodesy::{LatLon, LatLonE7, LocalFrame, ProjectionError, Xy};
 
@@ -11,6 +13,9 @@ const WORTH_OF_A_WAYPOINT: f64 = 1.5e-4;
 
 /// Turns below this are no corner, radians.
 const NO_TURN: f64 = 1e-6;
+
+/// Edges whose directions differ by less than this angle have no meeting point, radians.
+const PARALLEL: f64 = 1e-9;
 
 /// Removes what a path does not need: corners that can be cut, and pairs of corners that one
 /// can replace at next to no cost in length. Edges stay clear.
@@ -61,16 +66,16 @@ fn merge_corners(path: &mut Vec<Xy>, space: &LegSpace<'_>, allowance: f64) {
     }
 }
 
-/// Where the edge `a`-`b`, lengthened beyond `b`, meets `d`-`c`, lengthened beyond `c`.
+/// Where the edge `a`-`b`, lengthened beyond `b`, meets `d`-`c`, lengthened beyond `c`: the
+/// solution of `a + t (b − a) = d + s (c − d)` with `t, s > 1`.
 fn meeting_point(a: Xy, b: Xy, c: Xy, d: Xy) -> Option<Xy> {
-    let (u, v) = (b - a, c - d);
-    let parallel = cross(u, v);
-    if parallel.abs() < 1e-9 * distance(a, b) * distance(c, d) {
+    let vector = |from: Xy, to: Xy| Vector2::new(to.x - from.x, to.y - from.y);
+    let (u, v) = (vector(a, b), vector(d, c));
+    if u.perp(&v).abs() < PARALLEL * u.norm() * v.norm() {
         return None;
     }
-    let t = cross(d - a, v) / parallel;
-    let s = cross(d - a, u) / parallel;
-    (t > 1.0 && s > 1.0).then(|| a + u * t)
+    let shares = Matrix2::from_columns(&[u, -v]).lu().solve(&vector(a, d))?;
+    (shares.x > 1.0 && shares.y > 1.0).then(|| a + (b - a) * shares.x)
 }
 
 /// A finished path: what the vehicle will fly.

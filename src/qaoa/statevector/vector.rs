@@ -6,7 +6,7 @@ use std::ops::{Add, AddAssign, Mul, Sub};
 use super::super::simd::F4;
 
 /// A few numbers next to each other.
-pub trait Vector:
+pub(super) trait Vector:
     Copy
     + Default
     + std::fmt::Debug
@@ -69,7 +69,7 @@ impl Vector for F4 {
 /// Eight numbers in single precision.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[repr(align(32))]
-pub struct S8([f32; 8]);
+pub(super) struct S8([f32; 8]);
 
 macro_rules! lane_by_lane {
     ($trait:ident, $method:ident, $operator:tt) => {
