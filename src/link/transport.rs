@@ -1,4 +1,4 @@
-//! Serial ports, datagrams and TCP streams as one thing: a [`Source`] of frames and a [`Sink`] for
+//! Serial ports, datagrams and TCP streams as one thing: a source of frames and a sink for
 //! frames. Opening and framing only; who speaks, and what, is [`super::component`]'s.
 
 use std::io;
