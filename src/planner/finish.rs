@@ -8,8 +8,8 @@ use super::polyline::{distance, length, turn};
 use crate::airspace::RegionId;
 use crate::geodesy::{LatLon, LatLonE7, LocalFrame, ProjectionError, Xy};
 
-/// What saving one waypoint may cost, as a share of the path's length.
-const WORTH_OF_A_WAYPOINT: f64 = 1.5e-4;
+/// What all the waypoints that are saved may cost together, as a share of the path's length.
+pub const WORTH_OF_FEW: f64 = 4e-4;
 
 /// Turns below this are no corner, radians.
 const NO_TURN: f64 = 1e-6;
@@ -17,20 +17,44 @@ const NO_TURN: f64 = 1e-6;
 /// Edges whose directions differ by less than this angle have no meeting point, radians.
 const PARALLEL: f64 = 1e-9;
 
-/// Removes what a path does not need: corners that can be cut, and pairs of corners that one
-/// can replace at next to no cost in length. Edges stay clear.
+/// Removes what a path does not need: corners that can be cut, and pairs of corners that one can
+/// replace, the cheapest first, as long as all of them together cost no more than `share` of
+/// the length. Edges stay clear.
 #[must_use]
-pub fn with_few_corners(path: &[Xy], space: &LegSpace<'_>) -> Vec<Xy> {
+pub fn with_few_corners(path: &[Xy], space: &LegSpace<'_>, share: f64) -> Vec<Xy> {
     let mut path = path.to_vec();
-    let allowance = WORTH_OF_A_WAYPOINT * length(&path);
+    cut_corners(&mut path, space);
+    let mut allowance = share * length(&path);
+    // What replacing the corners `k` and `k + 1` by one costs; `None` where that cannot be done.
+    let price = |path: &[Xy], k: usize| -> Option<(f64, Xy)> {
+        let [a, b, c, d] = *path.get(k.checked_sub(1)?..k + 3)? else { return None };
+        let meeting = meeting_point(a, b, c, d)?;
+        Some((distance(b, meeting) + distance(meeting, c) - distance(b, c), meeting))
+    };
+    let mut prices: Vec<_> = (0..path.len()).map(|k| price(&path, k)).collect();
     loop {
-        let before = path.len();
-        cut_corners(&mut path, space);
-        merge_corners(&mut path, space, allowance);
-        if path.len() == before {
-            return path;
+        let cheapest = prices
+            .iter()
+            .enumerate()
+            .filter_map(|(k, price)| price.map(|(extra, meeting)| (extra, k, meeting)))
+            .min_by(|x, y| x.0.total_cmp(&y.0));
+        let Some((extra, k, meeting)) = cheapest.filter(|cheapest| cheapest.0 <= allowance) else {
+            break;
+        };
+        if space.is_clear(path[k - 1], meeting) && space.is_clear(meeting, path[k + 2]) {
+            path[k] = meeting;
+            path.remove(k + 1);
+            prices.remove(k + 1);
+            allowance -= extra;
+            for near in k.saturating_sub(2)..(k + 3).min(path.len()) {
+                prices[near] = price(&path, near);
+            }
+        } else {
+            prices[k] = None;
         }
     }
+    cut_corners(&mut path, space);
+    path
 }
 
 /// Drops every corner whose neighbours see each other: the path only gets shorter.
@@ -41,25 +65,6 @@ fn cut_corners(path: &mut Vec<Xy>, space: &LegSpace<'_>) {
         if straight || space.is_clear(path[i - 1], path[i + 1]) {
             path.remove(i);
             i = i.saturating_sub(1).max(1);
-        } else {
-            i += 1;
-        }
-    }
-}
-
-/// Replaces neighbouring corners that turn the same way by the point where their outer edges
-/// meet, where that is clear and costs no more than `allowance` metres.
-fn merge_corners(path: &mut Vec<Xy>, space: &LegSpace<'_>, allowance: f64) {
-    let mut i = 1;
-    while i + 2 < path.len() {
-        let [a, b, c, d] = [path[i - 1], path[i], path[i + 1], path[i + 2]];
-        if let Some(meeting) = meeting_point(a, b, c, d)
-            && distance(b, meeting) + distance(meeting, c) - distance(b, c) <= allowance
-            && space.is_clear(a, meeting)
-            && space.is_clear(meeting, d)
-        {
-            path[i] = meeting;
-            path.remove(i + 1);
         } else {
             i += 1;
         }

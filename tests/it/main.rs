@@ -7,5 +7,6 @@ mod bad_links;
 mod campaign;
 mod commands;
 mod replacing;
+mod scenes;
 mod sitl;
 mod transfers;
