@@ -1,13 +1,13 @@
 //! A* as the paper sets it ("Experimental Settings"): a grid of 0.5 m with eight neighbours, the
 //! Euclidean distance as the estimate, and a smoothing factor of 0.2.
 //!
-//! The grid has no edge: it is kept in tiles that are made when the search comes to them, and ends
-//! where the airspace does or where the search has used up its expansions.
+//! The grid is kept in tiles that are made when the search comes to them: no memory is spent on
+//! where it does not go.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
 
-use super::{Effort, Failure, Outcome};
+use super::{Effort, Failure, Outcome, Reach};
 use crate::geodesy::Xy;
 use crate::planner::leg_space::LegSpace;
 use crate::planner::polyline::distance;
@@ -146,6 +146,7 @@ struct Search<'a> {
     expansions: usize,
     start: Xy,
     goal: Xy,
+    reach: Reach,
     index: HashMap<Cell, usize>,
     tiles: Vec<Box<[Known]>>,
 }
@@ -158,6 +159,7 @@ impl<'a> Search<'a> {
             expansions: settings.expansions,
             start,
             goal,
+            reach: Reach::of(space, start, goal),
             index: HashMap::new(),
             tiles: Vec::new(),
         }
@@ -168,8 +170,8 @@ impl<'a> Search<'a> {
         self.start + offset * self.resolution
     }
 
-    /// How far an edge leads from its cell.
-    fn reach(&self) -> f64 {
+    /// How far an edge leads from its cell at the most.
+    fn diagonal(&self) -> f64 {
         self.resolution * std::f64::consts::SQRT_2
     }
 
@@ -203,13 +205,16 @@ impl<'a> Search<'a> {
         let here = self.point(cell);
         let margin = self.space.margin();
         let rest = distance(here, self.goal);
-        if rest <= self.reach() && self.space.airspace().is_clear(here, self.goal, margin) {
+        if rest <= self.diagonal() && self.space.airspace().is_clear(here, self.goal, margin) {
             let estimate = cost + rest;
             open.push(Reverse(Open { estimate, rest: 0.0, cell, arrives: true }));
         }
         for (by, (column, row)) in NEIGHBOURS.into_iter().enumerate() {
             let next = (cell.0 + column, cell.1 + row);
-            let step = if column != 0 && row != 0 { self.reach() } else { self.resolution };
+            if !self.reach.contains(self.point(next)) {
+                continue;
+            }
+            let step = if column != 0 && row != 0 { self.diagonal() } else { self.resolution };
             effort.edges += 1;
             let known = self.known(next);
             if known.closed || cost + step >= known.cost {
@@ -275,7 +280,7 @@ impl<'a> Search<'a> {
         let side = f64::from(SIDE) * self.resolution;
         let corner = self.point((tile.0 * SIDE, tile.1 * SIDE));
         let centre = corner + Xy { x: side / 2.0, y: side / 2.0 };
-        let needed = self.space.margin() + self.reach() + side * std::f64::consts::FRAC_1_SQRT_2;
+        let needed = self.space.margin() + self.diagonal() + side * std::f64::consts::FRAC_1_SQRT_2;
         match self.space.airspace().nearest(centre, centre, needed) {
             None => Room::Wide,
             Some(_) => Room::Unknown,
@@ -290,7 +295,7 @@ impl<'a> Search<'a> {
         }
         let point = self.point(cell);
         let margin = self.space.margin();
-        let room = match self.space.airspace().nearest(point, point, margin + self.reach()) {
+        let room = match self.space.airspace().nearest(point, point, margin + self.diagonal()) {
             None => Room::Wide,
             Some((clearance, _)) if clearance >= margin && clearance > 0.0 => Room::Tight,
             Some(_) => Room::Blocked,
@@ -381,11 +386,15 @@ mod tests {
             Outcome::NotFound { failure, effort } => (failure, effort.iterations),
             Outcome::Found { .. } => panic!("{outcome:?}"),
         };
-        let outward = failure(settings.search(&space, ORIGIN, inside));
-        assert_eq!(outward, (Failure::Exhausted, 3000));
         let (why, iterations) = failure(settings.search(&space, inside, ORIGIN));
         assert_eq!(why, Failure::NoWay);
         assert!((500..3000).contains(&iterations));
+        let inward = failure(settings.search(&space, ORIGIN, inside));
+        assert_eq!(inward, (Failure::Exhausted, 3000));
+        let settings = AStar { expansions: 1_000_000, ..settings };
+        let (why, iterations) = failure(settings.search(&space, ORIGIN, inside));
+        assert_eq!(why, Failure::NoWay);
+        assert!(iterations < 20_000);
     }
 
     #[test]

@@ -2,7 +2,8 @@
 //!
 //! - [`astar`]: A* over a fine grid, and the smoothing of its path;
 //! - [`rrt`]: a rapidly-exploring random tree;
-//! - [`paper`]: the lengths that the paper reports.
+//! - [`paper`]: the lengths that the paper reports;
+//! - `reach`: how far from the leg they search.
 //!
 //! Both plan one leg in the planner's [`LegSpace`](crate::planner::leg_space::LegSpace), with the
 //! same margin from the same exact geometry. They are yardsticks only: no mission is ever planned
@@ -10,12 +11,14 @@
 
 pub mod astar;
 pub mod paper;
+mod reach;
 pub mod rrt;
 
 pub use astar::AStar;
 pub use rrt::Rrt;
 
 use crate::geodesy::Xy;
+use reach::Reach;
 
 /// What a search has spent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -29,7 +32,7 @@ pub struct Effort {
 /// Why a search ended without a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Failure {
-    /// Everything within reach was searched: at this resolution there is no path.
+    /// Everything within reach was searched: at this resolution there is no path there.
     NoWay,
     /// The iterations allowed were used up.
     Exhausted,

@@ -9,8 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
-use super::{Effort, Failure, Outcome};
-use crate::airspace::Outline;
+use super::{Effort, Failure, Outcome, Reach};
 use crate::geodesy::Xy;
 use crate::planner::leg_space::LegSpace;
 use crate::planner::polyline::distance;
@@ -47,7 +46,7 @@ impl Rrt {
     #[must_use]
     pub fn search(&self, space: &LegSpace<'_>, start: Xy, goal: Xy) -> Outcome {
         let clear = |a: Xy, b: Xy| space.airspace().is_clear(a, b, space.margin());
-        let (low, high) = sampled_box(space, start, goal);
+        let Reach { low, high } = Reach::of(space, start, goal);
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         let mut tree = Tree::new(start);
         let mut arrival = joins(start, goal, self.step.0, &clear).then_some(0);
@@ -126,37 +125,6 @@ impl Tree {
     }
 }
 
-/// Where samples are drawn: around everything that the airspace has and the ends of the leg, but
-/// not further from the leg than the leg is long (at least 100 m).
-fn sampled_box(space: &LegSpace<'_>, start: Xy, goal: Xy) -> (Xy, Xy) {
-    let margin = 2.0 * space.margin();
-    let reach = distance(start, goal).max(100.0);
-    let ends = |grown: f64| {
-        let lower = Xy { x: start.x.min(goal.x) - grown, y: start.y.min(goal.y) - grown };
-        let upper = Xy { x: start.x.max(goal.x) + grown, y: start.y.max(goal.y) + grown };
-        (lower, upper)
-    };
-    let (mut low, mut high) = ends(margin);
-    let mut cover = |point: &Xy, grown: f64| {
-        low = Xy { x: low.x.min(point.x - grown), y: low.y.min(point.y - grown) };
-        high = Xy { x: high.x.max(point.x + grown), y: high.y.max(point.y + grown) };
-    };
-    for outline in space.airspace().outlines() {
-        match outline {
-            Outline::Solid(rings) => rings.iter().flatten().for_each(|point| cover(point, margin)),
-            Outline::Zone(ring) => ring.iter().for_each(|point| cover(point, margin)),
-            Outline::SolidDisc { centre, radius } | Outline::ZoneDisc { centre, radius } => {
-                cover(centre, radius + margin);
-            }
-        }
-    }
-    let (lowest, highest) = ends(reach);
-    (
-        Xy { x: low.x.max(lowest.x), y: low.y.max(lowest.y) },
-        Xy { x: high.x.min(highest.x), y: high.y.min(highest.y) },
-    )
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -217,14 +185,5 @@ mod tests {
                 other => panic!("{other:?}"),
             }
         }
-    }
-
-    #[test]
-    fn no_sample_is_wasted_far_from_the_leg() {
-        let far = [(9000.0, 9000.0), (9010.0, 9000.0), (9010.0, 9010.0), (9000.0, 9010.0)];
-        let scene = Scene::new(&[far]);
-        let (low, high) = sampled_box(&scene.space(5.0), START, GOAL);
-        assert_eq!((low.x, high.x), (-10.0, 160.0));
-        assert_eq!((low.y, high.y), (-10.0, 100.0));
     }
 }

@@ -93,3 +93,75 @@ fn rule(from: (f64, f64), to: (f64, f64)) -> Line {
         .set("y2", to.1)
         .set("stroke", "#ddd")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::compare::measure::Measured;
+    use crate::planner::rounds::Challenger;
+
+    fn scenario(name: &str, loss: &[f64]) -> ScenarioResult {
+        let round = RoundDocument {
+            challenger: Challenger::Route,
+            engine: "chain".into(),
+            qubits: 20,
+            layers: 5,
+            loss: loss.to_vec(),
+            best_sample: 100.0,
+            exact_optimum: 100.0,
+            gap: 0.0,
+            p_optimum: 0.1,
+            penalty: 60.0,
+            distinct: 7,
+            length_m: 100.0,
+            improved: true,
+        };
+        let quav = Measured {
+            method: Method::Quav,
+            runs: 1,
+            found: 1,
+            length_m: Some(100.0),
+            min_clearance_m: Some(5.0),
+            collisions: 0,
+            time_ms: 1.0,
+            iterations: 1.0,
+            reason: None,
+            rounds: vec![round],
+        };
+        let methods = vec![quav];
+        ScenarioResult { name: name.into(), legs: 1, straight_m: 90.0, methods, paper: None }
+    }
+
+    /// The curves' points, as in the picture.
+    fn curves(picture: &str) -> Vec<Vec<(f64, f64)>> {
+        let point = |pair: &str| {
+            let (x, y) = pair.split_once(',').unwrap();
+            (x.parse().unwrap(), y.parse().unwrap())
+        };
+        let all = picture.split("<polyline").skip(1);
+        all.map(|curve| curve.split("points=\"").nth(1).unwrap().split('"').next().unwrap())
+            .map(|points| points.split(' ').map(point).collect())
+            .collect()
+    }
+
+    #[test]
+    fn a_curve_begins_at_the_top_left_and_ends_at_the_bottom_when_it_reaches_the_optimum() {
+        let picture = loss_curves(&[scenario("s1", &[300.0, 200.0, 100.0])]);
+        let middle = (f64::midpoint(LEFT, RIGHT), f64::midpoint(TOP, BOTTOM));
+        assert_eq!(curves(&picture), [[(LEFT, TOP), middle, (RIGHT, BOTTOM)]]);
+    }
+
+    #[test]
+    fn names_cannot_break_the_picture_and_a_training_without_a_fall_is_left_out() {
+        let named = scenario("<a & \"b\">", &[300.0, 100.0]);
+        let picture = loss_curves(&[named, scenario("flat", &[100.0, 100.0])]);
+        assert_eq!(curves(&picture).len(), 1);
+        let mut reader = quick_xml::Reader::from_str(&picture);
+        while reader.read_event().unwrap() != quick_xml::events::Event::Eof {}
+    }
+
+    #[test]
+    fn nothing_to_draw_is_an_empty_chart() {
+        assert!(curves(&loss_curves(&[])).is_empty());
+    }
+}

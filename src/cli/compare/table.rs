@@ -17,7 +17,10 @@ const MEASUREMENTS: usize = 7;
 /// The text of a comparison.
 #[must_use]
 pub fn text(comparison: &Comparison) -> String {
-    let mut out = String::new();
+    let runs = comparison.scenarios.iter().flat_map(|scenario| &scenario.methods);
+    let seeds = runs.map(|row| row.runs).max().unwrap_or(1);
+    let buffer = comparison.settings.buffer;
+    let mut out = format!("A buffer of {buffer} for all; RRT: means over {seeds} seeds.\n\n");
     for scenarios in comparison.scenarios.chunks(SIDE_BY_SIDE) {
         lengths(scenarios, &mut out);
         block("clearance, metres", scenarios, |row| metres(row.min_clearance_m), &mut out);
@@ -36,8 +39,8 @@ pub fn text(comparison: &Comparison) -> String {
     }
     if comparison.scenarios.iter().any(|scenario| scenario.paper.is_some()) {
         out.push_str(
-            "The paper's maps are not published; s1 to s6 resemble them, so its figures are for\n\
-             orientation.\n",
+            "The paper's maps are not published; s1 to s6 resemble them, and its figures are\n\
+             for orientation.\n",
         );
     }
     if let Some(first) = comparison.scenarios.first().filter(|_| !comparison.growth.is_empty()) {
@@ -54,7 +57,7 @@ pub fn text(comparison: &Comparison) -> String {
 fn lengths(scenarios: &[ScenarioResult], out: &mut String) {
     heading("length, metres", scenarios, out);
     line("straight line", scenarios.iter().map(|scenario| metres(Some(scenario.straight_m))), out);
-    let mut paper = |label: &str, figure: fn(PaperFigures) -> f64, out: &mut String| {
+    let paper = |label: &str, figure: fn(PaperFigures) -> f64, out: &mut String| {
         if scenarios.iter().any(|scenario| scenario.paper.is_some()) {
             line(label, scenarios.iter().map(|scenario| metres(scenario.paper.map(figure))), out);
         }
