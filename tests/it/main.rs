@@ -6,6 +6,7 @@
 mod bad_links;
 mod campaign;
 mod commands;
+mod compare;
 mod replacing;
 mod scenes;
 mod sitl;
