@@ -1,12 +1,12 @@
 //! The picture of a plan: one self-contained SVG on white, for browsers, README files and print.
 //!
-//! - [`scene`]: what is drawn, in the local metres of one zone;
-//! - [`view`]: from local metres to the page;
-//! - [`map`]: obstacles, buffers, fences, candidates, old and new route;
-//! - [`places`]: the numbered waypoints, start and goal;
-//! - [`chart`]: axes and curves; [`training`]: the two charts of the QAOA rounds;
-//! - [`findings`]: what is not clear, where a mission was only judged;
-//! - [`legend`]: what the colours mean.
+//! - `scene`: what is drawn, in the local metres of one zone;
+//! - `view`: from local metres to the page;
+//! - `map`: obstacles, buffers, fences, candidates, old and new route;
+//! - `places`: the numbered waypoints, start and goal;
+//! - `chart`: axes and curves; `training`: the two charts of the QAOA rounds;
+//! - `findings`: what is not clear, where a mission was only judged;
+//! - `legend`: what the colours mean.
 //!
 //! A mission over several zones is drawn for the zone with the most legs.
 
@@ -34,9 +34,10 @@ const PAGE: f64 = 1200.0;
 const BORDER: f64 = 20.0;
 const GAP: f64 = 24.0;
 
-/// The height of the title, and of the charts below the map.
+/// The height of the title, and of what is below the map: the charts, or what is not clear.
 const HEAD: f64 = 66.0;
 const CHARTS: f64 = 250.0;
+const FINDINGS: f64 = 200.0;
 
 /// The least and the most height of the map.
 const MAP_HEIGHT: (f64, f64) = (420.0, 900.0);
@@ -114,8 +115,9 @@ pub fn picture<'a>(
     let view = View::new(panel, low, high);
 
     let charts = panel.y + panel.height + GAP;
-    let page_height = charts + CHARTS + BORDER;
-    let losses = Rect { x: BORDER, y: charts, width: 500.0, height: CHARTS };
+    let below = if subject.after.is_some() { CHARTS } else { FINDINGS };
+    let page_height = charts + below + BORDER;
+    let losses = Rect { x: BORDER, y: charts, width: 500.0, height: below };
     let lengths = Rect { x: losses.right() + GAP, width: 330.0, ..losses };
     let key =
         Rect { x: lengths.right() + GAP, width: PAGE - BORDER - GAP - lengths.right(), ..losses };

@@ -118,15 +118,15 @@ impl Numbers {
             })
         });
         let best = around
-            .map(|(distance, at)| (self.cost(rect(at)) + distance / 10.0, at))
+            .map(|(distance, at)| (self.cost(rect(at), dot) + distance / 10.0, at))
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .map_or(dot, |(_, at)| at);
         self.taken.push(rect(best));
         best
     }
 
-    /// What a number there would cover.
-    fn cost(&self, rect: Rect) -> f64 {
+    /// How bad a place is for a dot's number: what it would cover, and dots that it is nearer to.
+    fn cost(&self, rect: Rect, dot: Xy) -> f64 {
         let labels = self.taken.iter().filter(|taken| taken.overlaps(rect)).count() as f64;
         let near = Rect {
             x: rect.x - 5.0,
@@ -135,9 +135,11 @@ impl Numbers {
             height: rect.height + 10.0,
         };
         let dots = self.dots.iter().filter(|dot| near.contains(dot.x, dot.y)).count() as f64;
+        let away = |at: Xy| (at.x - rect.x - rect.width / 2.0).hypot(at.y - rect.y - 7.0);
+        let nearer = self.dots.iter().filter(|&&other| away(other) < away(dot)).count() as f64;
         let lines = self.edges.iter().filter(|(a, b)| rect.meets(*a, *b)).count() as f64;
         let out = !self.panel.contains(rect.x, rect.y)
             || !self.panel.contains(rect.right(), rect.bottom());
-        30.0 * labels + 12.0 * dots + 6.0 * lines + if out { 100.0 } else { 0.0 }
+        30.0 * labels + 12.0 * dots + 8.0 * nearer + 6.0 * lines + if out { 100.0 } else { 0.0 }
     }
 }

@@ -1,5 +1,7 @@
 //! What is drawn, in the local metres of the zone with the most legs.
 
+use std::collections::HashSet;
+
 use geo::MultiPolygon;
 
 use super::Subject;
@@ -90,7 +92,7 @@ impl<'a> Scene<'a> {
         let is_here = |leg: &Leg| leg.kind != LegKind::Stay && (only || zone_of(leg) == field.zone);
         let edges = |verdict: &Verdict, wanted: &dyn Fn(&LegVerdict) -> bool| {
             let legs = verdict.legs.iter().filter(|v| is_here(&v.leg) && wanted(v));
-            legs.map(|v| edge(&v.leg, &frame)).collect::<Result<Vec<_>, _>>()
+            legs.map(|v| edge(&v.leg, &frame)).collect::<Result<Vec<_>, _>>().map(without_repeats)
         };
         scene.outlines = &field.outlines;
         scene.union = field.union.as_ref();
@@ -244,6 +246,18 @@ fn zone_of(leg: &Leg) -> Zone {
 fn edge(leg: &Leg, frame: &LocalFrame) -> Result<Edge, ProjectionError> {
     let (from, to) = (frame.to_local(leg.from.position)?, frame.to_local(leg.to.position)?);
     Ok(Edge { from, to })
+}
+
+/// One edge for all between the same places, whatever their direction: dashes of two would fill
+/// each other's gaps.
+fn without_repeats(mut edges: Vec<Edge>) -> Vec<Edge> {
+    let bits = |at: Xy| (at.x.to_bits(), at.y.to_bits());
+    let mut known = HashSet::new();
+    edges.retain(|edge| {
+        let (from, to) = (bits(edge.from), bits(edge.to));
+        known.insert((from.min(to), from.max(to)))
+    });
+    edges
 }
 
 /// Where the legs that are flown end, and where the first one starts.
