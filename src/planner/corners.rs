@@ -61,9 +61,8 @@ pub fn corners(
             let turn = std::f64::consts::TAU;
             // The points may stand out from a large disc no further than from a run of corners.
             let step = (8.0 * RUN_HEIGHT / radius).sqrt().clamp(FINEST, step);
-            Arc { centre: *centre, radius, from: 0.0, turn, region }.corners(
-                step, space, &mut found,
-            );
+            Arc { centre: *centre, radius, from: 0.0, turn, region }
+                .corners(step, space, &mut found);
         }
         Boundary::Ring(ring) => {
             for arc in ring_arcs(ring, space.planning_margin() + BEYOND, region) {

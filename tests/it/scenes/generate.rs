@@ -360,7 +360,8 @@ pub(crate) fn inclusions(seed: u64) -> Scene {
         regions.push(zone(ring));
     }
     if rng.random_bool(0.5) {
-        let shape = Shape::Disc([rng.random_range(-40.0..40.0), 0.0], rng.random_range(200.0..300.0));
+        let shape =
+            Shape::Disc([rng.random_range(-40.0..40.0), 0.0], rng.random_range(200.0..300.0));
         regions.push(Region { inclusion: true, shape });
     }
     for _ in 0..rng.random_range(3..9) {
@@ -372,7 +373,8 @@ pub(crate) fn inclusions(seed: u64) -> Scene {
     // Ends as far out as there is room.
     let mut end = |angle: f64| {
         let direction = rotated([1.0, 0.0], angle);
-        let open = (0..400).rev().map(|k| mul(direction, f64::from(k))).find(|&p| is_open(&regions, p));
+        let open =
+            (0..400).rev().map(|k| mul(direction, f64::from(k))).find(|&p| is_open(&regions, p));
         open.unwrap_or([0.0, 0.0])
     };
     let (start, goal) = (end(2.9), end(0.2));
@@ -563,8 +565,14 @@ pub(crate) fn infeasible(seed: u64) -> Scene {
         }
         // A courtyard whose gate is too narrow, as one concave obstacle.
         1 => {
-            let line =
-                [[100. + gap, -40.], [150., -40.], [150., 40.], [60., 40.], [60., -40.], [100., -40.]];
+            let line = [
+                [100. + gap, -40.],
+                [150., -40.],
+                [150., 40.],
+                [60., 40.],
+                [60., -40.],
+                [100., -40.],
+            ];
             vec![solid(ribbon(&line, 0.01))]
         }
         // A ring of discs around the start.

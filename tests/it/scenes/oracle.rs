@@ -25,9 +25,8 @@ pub(crate) fn shortest(scene: &Scene, margin: f64, bound: Option<f64>) -> Option
         })
     };
     let threshold = margin - 1e-6;
-    let within = |p: P| {
-        bound.is_none_or(|bound| dist(scene.start, p) + dist(p, scene.goal) <= bound + 1e-6)
-    };
+    let within =
+        |p: P| bound.is_none_or(|bound| dist(scene.start, p) + dist(p, scene.goal) <= bound + 1e-6);
     let mut points = vec![scene.start, scene.goal];
     if points.iter().any(|&p| !in_zones(p) || !walls.are_clear(p, p, threshold)) {
         return None;
