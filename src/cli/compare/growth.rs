@@ -13,7 +13,6 @@ use crate::baseline::{AStar, Outcome, Rrt};
 use crate::cli::CliError;
 use crate::geodesy::Xy;
 use crate::planner::Settings;
-use crate::planner::polyline::distance;
 use crate::planner::trellis::{EdgeJudge, Trellis};
 use crate::qaoa::chain::ChainEngine;
 use crate::qaoa::train::train;
@@ -131,7 +130,6 @@ fn chain(start: Xy, goal: Xy, edges: usize, judge: &EdgeJudge<'_>) -> Result<Isi
         let interior = (1..edges).map(place);
         std::iter::once(start).chain(interior).chain([goal]).collect()
     };
-    debug_assert!(distance(start, goal) > 0.0);
     let trellis = Trellis::new(stations(&straight), stations(&bow), judge);
     match trellis.ising(trellis.penalty()) {
         Ok(chain) => Ok(chain.into()),

@@ -8,7 +8,7 @@ use crate::cli::once::rally_places;
 use crate::cli::plan::position_of_start;
 use crate::formats::Scenario;
 use crate::geodesy::{LatLon, LocalFrame, ProjectionError, Xy, Zone, geodesic_distance};
-use crate::mission::legs::LegShape;
+use crate::mission::legs::{LegKind, LegShape};
 use crate::planner::leg_space::LegSpace;
 use crate::replan::{FieldError, Input, Options, ReplanError, judge};
 use crate::units::Metres;
@@ -93,8 +93,10 @@ pub fn legs_to_plan(scenario: &Scenario, options: &Options) -> Result<Vec<LegTas
     let tasks: Result<Vec<LegTask>, FieldError> = verdict
         .legs
         .iter()
-        .filter(|verdict| verdict.blocker.is_some() && verdict.leg.shape == LegShape::Straight)
+        .filter(|verdict| verdict.blocker.is_some())
         .map(|verdict| &verdict.leg)
+        .filter(|leg| leg.shape == LegShape::Straight)
+        .filter(|leg| matches!(leg.kind, LegKind::Flown | LegKind::Return(_)))
         .filter(|leg| leg.insert_before.is_some_and(|place| seen.insert(place)))
         .map(|leg| LegTask::new(leg.from.position, leg.to.position, scenario, options))
         .collect();

@@ -42,7 +42,7 @@ pub fn loss_curves(scenarios: &[ScenarioResult]) -> String {
         .set("font-family", "sans-serif")
         .set("font-size", 13)
         .add(Rectangle::new().set("width", WIDTH).set("height", HEIGHT).set("fill", "#fff"))
-        .add(label("QAOA loss of the first training", LEFT, TOP - 18.0, "start"))
+        .add(label("QAOA loss above the exact optimum, first training", LEFT, TOP - 18.0, "start"))
         .add(label("Adam step", f64::midpoint(LEFT, RIGHT), HEIGHT - 12.0, "middle"));
     for tick in 0..=4 {
         let share = most * f64::from(tick) / 4.0;
