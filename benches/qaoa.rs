@@ -38,8 +38,10 @@ fn three_regular(qubits: usize) -> Ising {
     let couplings = loop {
         let mut stubs: Vec<usize> = (0..3 * qubits).map(|stub| stub / 3).collect();
         stubs.shuffle(rng);
-        let mut edges: Vec<(usize, usize)> =
-            stubs.chunks_exact(2).map(|pair| (pair[0].min(pair[1]), pair[0].max(pair[1]))).collect();
+        let mut edges: Vec<(usize, usize)> = stubs
+            .chunks_exact(2)
+            .map(|pair| (pair[0].min(pair[1]), pair[0].max(pair[1])))
+            .collect();
         edges.sort_unstable();
         edges.dedup();
         if edges.len() == 3 * qubits / 2 && edges.iter().all(|(i, j)| i != j) {

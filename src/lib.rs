@@ -11,10 +11,13 @@
 //! - [`geodesy`], [`airspace`]: positions, projections, and barriers in the plane;
 //! - [`planner`]: one leg: candidates, QAOA rounds, finish;
 //! - [`qaoa`]: Ising problems and the engines that run the circuit;
+//! - [`baseline`]: A* and RRT, to compare with;
 //! - [`replan`]: a whole mission, and the judgement of any mission;
+//! - [`report`]: what is said and shown about it: JSON, a summary, a picture;
 //! - [`cli`]: the commands of `quavd`.
 
 pub mod airspace;
+pub mod baseline;
 pub mod cli;
 pub mod fence;
 pub mod formats;

@@ -67,12 +67,15 @@ pub enum Boundary {
 /// inscribed: nothing outside the circle is allowed.
 const CIRCLE_SIDES: u32 = 256;
 
+/// The bounding box of one ring of an obstacle: its region, and which of the region's rings.
+type SolidBox = GeomWithData<Rectangle<[f64; 2]>, (RegionId, usize)>;
+
 /// Fences as planar barriers in the metres of one local frame, unbuffered.
 #[derive(Debug)]
 pub struct Airspace {
     outlines: Vec<Outline>,
     barriers: BarrierIndex,
-    solids: RTree<GeomWithData<Rectangle<[f64; 2]>, (RegionId, usize)>>,
+    solids: RTree<SolidBox>,
     /// With [`InclusionRule::Any`]: the union of all inclusions, where there are any.
     union: Option<MultiPolygon>,
     zones: Vec<RegionId>,
@@ -210,6 +213,13 @@ impl Airspace {
         self.search(a, b, margin, margin).map(|(_, region)| region)
     }
 
+    /// The same for a segment whose start is known to be on the allowed side of everything.
+    #[must_use]
+    pub fn blocker_from_inside(&self, a: Xy, b: Xy, margin: f64) -> Option<RegionId> {
+        let margin = margin.max(f64::MIN_POSITIVE);
+        self.nearest_wall(a, b, margin, margin).map(|(_, region)| region)
+    }
+
     /// Whether a segment keeps at least `margin` metres from everything.
     #[must_use]
     pub fn is_clear(&self, a: Xy, b: Xy, margin: f64) -> bool {
@@ -220,6 +230,20 @@ impl Airspace {
     #[must_use]
     pub fn union(&self) -> Option<&MultiPolygon> {
         self.union.as_ref()
+    }
+
+    /// The obstacles that are at least in part in a box, by any one point of each of their parts.
+    pub fn obstacles_in(&self, low: Xy, high: Xy) -> impl Iterator<Item = (RegionId, Xy)> {
+        let envelope = AABB::from_corners([low.x, low.y], [high.x, high.y]);
+        self.solids.locate_in_envelope_intersecting(&envelope).filter_map(|entry| {
+            let (region, ring) = entry.data;
+            let point = match &self.outlines[region.0 as usize] {
+                Outline::Solid(rings) => *rings.get(ring)?.first()?,
+                Outline::SolidDisc { centre, .. } => *centre,
+                Outline::Zone(_) | Outline::ZoneDisc { .. } => return None,
+            };
+            Some((region, point))
+        })
     }
 
     /// The index over the barriers.
@@ -233,6 +257,10 @@ impl Airspace {
         if let Some(region) = self.forbidden_side(a) {
             return Some((0.0, region));
         }
+        self.nearest_wall(a, b, at_most, enough)
+    }
+
+    fn nearest_wall(&self, a: Xy, b: Xy, at_most: f64, enough: f64) -> Option<(f64, RegionId)> {
         let mut nearest = self.barriers.nearest(Line::new(a, b), at_most, enough);
         if self.union.is_none() {
             for &region in &self.zones {
@@ -277,9 +305,17 @@ fn regions(outlines: &[Outline]) -> impl Iterator<Item = (RegionId, &Outline)> {
     outlines.iter().enumerate().map(|(i, outline)| (RegionId(i as u32), outline))
 }
 
-fn solid_boxes(outlines: &[Outline]) -> Vec<GeomWithData<Rectangle<[f64; 2]>, (RegionId, usize)>> {
+fn solid_boxes(outlines: &[Outline]) -> Vec<SolidBox> {
     let mut boxes = Vec::new();
     for (id, outline) in regions(outlines) {
+        if let Outline::SolidDisc { centre, radius } = outline {
+            let reach = Xy { x: *radius, y: *radius };
+            let (low, high) = (*centre - reach, *centre + reach);
+            boxes.push(GeomWithData::new(
+                Rectangle::from_corners([low.x, low.y], [high.x, high.y]),
+                (id, 0),
+            ));
+        }
         if let Outline::Solid(rings) = outline {
             for (k, ring) in rings.iter().enumerate() {
                 let mut envelope = AABB::from_point([ring[0].x, ring[0].y]);

@@ -11,6 +11,7 @@ use crate::formats::{
     MAX_FILE_BYTES, Scenario, read_fences, read_mission, read_scenario, write_geojson, write_kml,
     write_plan, write_waypoints,
 };
+use crate::geodesy::ProjectionError;
 use crate::mission::Mission;
 
 /// A file that cannot be read or written.
@@ -128,7 +129,7 @@ pub fn bytes(path: &Path) -> Result<Vec<u8>, FileError> {
 pub fn write_all(
     paths: &[PathBuf],
     scenario: &Scenario,
-    picture: impl Fn() -> String,
+    picture: impl Fn() -> Result<String, ProjectionError>,
 ) -> Result<(), CliError> {
     for path in paths {
         let unusable = |error: crate::formats::WriteError| {
@@ -139,7 +140,9 @@ pub fn write_all(
             OutFormat::Waypoints => write_waypoints(&scenario.mission).map_err(unusable)?,
             OutFormat::GeoJson => write_geojson(scenario).map_err(unusable)?,
             OutFormat::Kml => write_kml(scenario).map_err(unusable)?,
-            OutFormat::Svg => picture(),
+            OutFormat::Svg => picture().map_err(|error| {
+                CliError::Usage(format!("cannot draw {}: {error}", path.display()))
+            })?,
         };
         write(path, text.as_bytes())?;
     }
@@ -147,7 +150,10 @@ pub fn write_all(
 }
 
 /// Replaces a file by new content, whole or not at all.
-fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
+///
+/// # Errors
+/// [`FileError::Write`].
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     let fail = |source| FileError::Write { path: path.to_owned(), source };
     let directory = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,

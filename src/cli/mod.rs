@@ -4,11 +4,12 @@
 //! - [`options`]: what the commands have in common, with the names of the configuration file;
 //! - [`files`]: scenarios, missions and fences from files, results to files;
 //! - [`progress`]: what is shown while something runs;
-//! - [`plan`], [`check`], [`once`], [`qaoa`]: one command each;
+//! - [`plan`], [`check`], [`once`], [`compare`], [`qaoa`]: one command each;
 //! - [`memory`]: what the machine has left;
 //! - [`exit`]: errors and their exit codes.
 
 pub mod check;
+pub mod compare;
 pub mod exit;
 pub mod files;
 pub mod memory;
@@ -46,6 +47,8 @@ enum Command {
     Plan(plan::PlanArgs),
     /// Judge any mission against any fences.
     Check(check::CheckArgs),
+    /// The paper's table: A*, RRT and QUAV side by side.
+    Compare(compare::CompareArgs),
     /// Run QAOA alone on an Ising problem.
     Qaoa(qaoa::QaoaArgs),
 }
@@ -60,6 +63,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Once(args) => once::run(args, &shown),
         Command::Plan(args) => plan::run(&args, &shown),
         Command::Check(args) => check::run(&args, &shown),
+        Command::Compare(args) => compare::run(&args, &shown),
         Command::Qaoa(args) => qaoa::run(&args).map_err(CliError::from),
     };
     match outcome {

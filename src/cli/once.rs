@@ -20,6 +20,7 @@ use crate::geodesy::LatLon;
 use crate::link::{ComponentId, Endpoint, Identity, Link, SystemId, Transport};
 use crate::mission::{self, Mission, MissionItem, MissionType};
 use crate::replan::{self, Input, Options, Replanned, replan};
+use crate::report::picture::picture;
 use crate::store::Store;
 use crate::vehicle::numbering::{to_mission, to_vehicle};
 use crate::vehicle::readback::differences;
@@ -166,7 +167,9 @@ async fn with_vehicle(
             done = Delivery { written: true, verified: true };
         }
         shown.clear();
-        files::write_all(&args.out, &planned_scenario(&read.scenario, planned), || String::new())?;
+        files::write_all(&args.out, &planned_scenario(&read.scenario, planned), || {
+            picture(planned, &outcome.run(), &format!("mission of {}", args.connect))
+        })?;
     }
     outcome.told(args.json, Some(done.told(vehicle, args.dry_run)))
 }

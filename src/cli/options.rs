@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::memory;
 use crate::airspace::InclusionRule;
 use crate::geodesy::Zone;
 use crate::planner::{CandidateSource, Rounds, Settings};
@@ -144,6 +145,7 @@ impl PlanningArgs {
             seed: self.seed,
             lambda: Metres(self.lambda),
             engine: self.engine,
+            memory_limit: memory::available(),
             ..base
         };
         Options { settings, ..self.safety.options() }

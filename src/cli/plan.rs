@@ -1,6 +1,6 @@
 //! `quavd plan`: the planning of `once` from files, without a vehicle.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
@@ -16,6 +16,7 @@ use crate::geodesy::LatLon;
 use crate::replan::{Input, Options, Progress, Replanned, replan};
 use crate::report::Run;
 use crate::report::json::PlanDocument;
+use crate::report::picture::picture;
 use crate::report::summary::plan_summary;
 
 /// The arguments of `quavd plan`.
@@ -67,9 +68,16 @@ pub fn run(args: &PlanArgs, shown: &Shown) -> Result<String, CliError> {
     let warnings = &scenario.warnings;
     let outcome = Outcome { planned, options: &options, warnings, load, total: began.elapsed() };
     if let Ok(planned) = &outcome.planned {
-        files::write_all(&args.out, &planned_scenario(&scenario, planned), || String::new())?;
+        files::write_all(&args.out, &planned_scenario(&scenario, planned), || {
+            picture(planned, &outcome.run(), &name_of(&args.scenario))
+        })?;
     }
     outcome.told(args.json, None)
+}
+
+/// What a picture of a file is called.
+fn name_of(path: &Path) -> String {
+    path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
 /// Where a file's vehicle stands: home, where the file has one.
@@ -119,19 +127,24 @@ struct Document {
 }
 
 impl Outcome<'_> {
-    /// The text for stdout, or the error with its document.
-    pub(super) fn told(self, json: bool, delivered: Option<Delivered>) -> Result<String, CliError> {
-        let run = Run {
+    /// The circumstances, for reports.
+    pub(super) fn run(&self) -> Run<'_> {
+        Run {
             options: self.options,
             warnings: self.warnings,
             fallback: None,
             load: self.load,
             total: self.total,
-        };
-        match self.planned {
-            Ok(planned) if json => document(PlanDocument::planned(&planned, &run), delivered),
+        }
+    }
+
+    /// The text for stdout, or the error with its document.
+    pub(super) fn told(self, json: bool, delivered: Option<Delivered>) -> Result<String, CliError> {
+        let run = self.run();
+        match &self.planned {
+            Ok(planned) if json => document(PlanDocument::planned(planned, &run), delivered),
             Ok(planned) => {
-                let mut text = plan_summary(&planned, &run);
+                let mut text = plan_summary(planned, &run);
                 if let Some(delivered) = delivered {
                     text.push_str(&format!("Vehicle {}: {}.\n", delivered.system, delivered.note));
                 }
@@ -139,11 +152,11 @@ impl Outcome<'_> {
             }
             Err(CliError::NoPath { reason, .. }) => {
                 let document = json
-                    .then(|| document(PlanDocument::failed(&reason, None, &run), delivered))
+                    .then(|| document(PlanDocument::failed(reason, None, &run), delivered))
                     .transpose()?;
-                Err(CliError::NoPath { reason, document })
+                Err(CliError::NoPath { reason: reason.clone(), document })
             }
-            Err(other) => Err(other),
+            Err(_) => self.planned.map(|_| String::new()),
         }
     }
 }

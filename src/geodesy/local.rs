@@ -94,7 +94,7 @@ mod tests {
     proptest! {
         #[test]
         fn local_distances_are_ground_distances_everywhere_on_earth(
-            lat in -89.9f64..89.9, lon in -180.0f64..180.0, angle in 0.0f64..6.28, radius in 1.0f64..800.0,
+            lat in -89.9f64..89.9, lon in -180.0f64..180.0, angle in 0.0f64..std::f64::consts::TAU, radius in 1.0f64..800.0,
         ) {
             let origin = LatLon::new(lat, lon).unwrap();
             let frame = LocalFrame::new(Zone::of(origin), origin).unwrap();

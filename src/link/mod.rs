@@ -8,6 +8,7 @@ pub mod component;
 pub mod frame;
 pub mod id;
 pub mod message;
+mod resync;
 pub mod transport;
 pub mod url;
 

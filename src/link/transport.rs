@@ -1,4 +1,4 @@
-//! Serial ports, datagrams and TCP streams as one thing: a [`Source`] of frames and a [`Sink`] for
+//! Serial ports, datagrams and TCP streams as one thing: a source of frames and a sink for
 //! frames. Opening and framing only; who speaks, and what, is [`super::component`]'s.
 
 use std::io;
@@ -13,6 +13,7 @@ use tokio::net::{TcpListener, TcpStream, UdpSocket, lookup_host};
 use tokio_serial::{DataBits, FlowControl, Parity, SerialPortBuilderExt, StopBits};
 
 use super::frame::Wire;
+use super::resync::Resync;
 use super::url::{Endpoint, HostPort};
 
 /// How long a TCP connection may take to come about.
@@ -22,8 +23,8 @@ const MAX_DATAGRAM: usize = 2048;
 
 /// An open link, not yet used.
 pub struct Transport {
-    pub(crate) source: Source,
-    pub(crate) sink: Sink,
+    pub(super) source: Source,
+    pub(super) sink: Sink,
 }
 
 /// Why an endpoint could not be opened.
@@ -66,26 +67,26 @@ impl Transport {
     {
         let (read, write) = tokio::io::split(stream);
         Self {
-            source: Source::Stream(AsyncMavlinkReader::new(Box::new(read))),
+            source: Source::Stream(AsyncMavlinkReader::new(Resync::new(Box::new(read)))),
             sink: Sink::Stream(Box::new(write)),
         }
     }
 }
 
 /// Where frames come from.
-pub(crate) enum Source {
-    Stream(AsyncMavlinkReader<Box<dyn AsyncRead + Send + Unpin>>),
+pub(super) enum Source {
+    Stream(AsyncMavlinkReader<Resync<Box<dyn AsyncRead + Send + Unpin>>>),
     Datagrams(Datagrams),
 }
 
 /// Where frames go to.
-pub(crate) enum Sink {
+pub(super) enum Sink {
     Stream(Box<dyn AsyncWrite + Send + Unpin>),
     Datagrams { socket: Arc<UdpSocket>, peer: Peer },
 }
 
 /// Frames out of datagrams, each framed by itself so that a broken one cannot spoil the next.
-pub(crate) struct Datagrams {
+pub(super) struct Datagrams {
     socket: Arc<UdpSocket>,
     peer: Peer,
     datagram: Option<(SocketAddr, AsyncMavlinkReader<io::Cursor<Vec<u8>>>)>,
@@ -93,7 +94,7 @@ pub(crate) struct Datagrams {
 
 /// Which address a datagram link talks to.
 #[derive(Clone, Default)]
-pub(crate) struct Peer(Arc<Mutex<PeerState>>);
+pub(super) struct Peer(Arc<Mutex<PeerState>>);
 
 #[derive(Clone, Copy, Default)]
 struct PeerState {
@@ -129,7 +130,7 @@ impl Peer {
     }
 
     /// From now on talk to this address only.
-    pub(crate) fn pin(&self, address: SocketAddr) {
+    pub(super) fn pin(&self, address: SocketAddr) {
         *self.state() = PeerState { address: Some(address), pinned: true };
     }
 }
@@ -137,7 +138,7 @@ impl Peer {
 impl Source {
     /// The next frame with a valid checksum. Bytes that are no frame are skipped, in bounded
     /// memory. Cancelling loses nothing.
-    pub(crate) async fn next(&mut self) -> io::Result<(MAVLinkMessageRaw, Option<SocketAddr>)> {
+    pub(super) async fn next(&mut self) -> io::Result<(MAVLinkMessageRaw, Option<SocketAddr>)> {
         match self {
             Self::Stream(reader) => {
                 let raw = reader.read_any_raw_message_with_dialect(&Wire).await;
@@ -148,7 +149,7 @@ impl Source {
     }
 
     /// The peer of a datagram link, to be pinned when the vehicle is known.
-    pub(crate) fn peer(&self) -> Option<Peer> {
+    pub(super) fn peer(&self) -> Option<Peer> {
         match self {
             Self::Stream(_) => None,
             Self::Datagrams(datagrams) => Some(datagrams.peer.clone()),
@@ -187,7 +188,7 @@ impl Datagrams {
 impl Sink {
     /// Writes one frame. On a datagram link without a peer yet it is dropped, as is one that the
     /// network cannot carry just now: MAVLink repeats what matters.
-    pub(crate) async fn send(&mut self, frame: &[u8]) -> io::Result<()> {
+    pub(super) async fn send(&mut self, frame: &[u8]) -> io::Result<()> {
         match self {
             Self::Stream(stream) => {
                 stream.write_all(frame).await?;

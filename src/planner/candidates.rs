@@ -7,7 +7,10 @@ use std::sync::atomic::AtomicBool;
 use geo::Line;
 use serde::Serialize;
 
+use super::corners::{COARSE, FINE};
+use super::finish::{WORTH_OF_FEW, with_few_corners};
 use super::grid::GridSearch;
+use super::homotopy::passes_differently;
 use super::leg_space::LegSpace;
 use super::polyline::{distance, length, turning};
 use super::search::{CornerPath, CornerSearch};
@@ -16,6 +19,9 @@ use crate::geodesy::Xy;
 
 /// How near a barrier is to a ray that meets it, metres.
 const ON_THE_RAY: f64 = 1e-6;
+
+/// A way that is longer than this many times the shortest cannot win.
+const WORTH_A_TRY: f64 = 1.5;
 
 /// Where a candidate comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -67,9 +73,10 @@ pub fn candidates(
     let mut found: Vec<Candidate> = Vec::new();
     let wanted = settings.candidates.max(1);
     if settings.source.uses_corners() {
-        let mut search = CornerSearch::new(*space, start, goal, cancelled);
+        let mut search = CornerSearch::new(*space, start, goal, COARSE, cancelled);
         for path in different_ways(&mut search, space, wanted) {
-            found.push(Candidate::new(path.points, Source::Corners, space));
+            let points = with_corners_that_fit(&path.points, space, settings.qubits);
+            found.push(Candidate::new(points, Source::Corners, space));
         }
     }
     if settings.source.uses_grid() || found.is_empty() {
@@ -84,29 +91,45 @@ pub fn candidates(
     found
 }
 
-/// The shortest path, and then for each gap that it takes the shortest one with that gap shut.
+/// A path with as few corners as its length allows, and with no more than there are qubits where
+/// that costs little.
+fn with_corners_that_fit(path: &[Xy], space: &LegSpace<'_>, qubits: usize) -> Vec<Xy> {
+    [1.0, 2.0, 4.0]
+        .into_iter()
+        .map(|factor| with_few_corners(path, space, factor * WORTH_OF_FEW))
+        .find(|path| path.len() <= qubits + 1)
+        .unwrap_or_else(|| with_few_corners(path, space, WORTH_OF_FEW))
+}
+
+/// The shortest path, and then for each gap that it takes a short one with that gap shut.
 fn different_ways(
     search: &mut CornerSearch<'_>,
     space: &LegSpace<'_>,
     wanted: usize,
 ) -> Vec<CornerPath> {
-    let Some(shortest) = search.shortest(&[]) else { return Vec::new() };
-    let mut ways = vec![shortest.clone()];
+    let Some(shortest) = search.shortest() else { return Vec::new() };
+    let longest = WORTH_A_TRY * shortest.length();
     let mut gaps = gaps(&shortest, space);
     // The narrowest gaps first: these are where passing on the other side is a different way.
     gaps.sort_by(|a, b| line_length(a).total_cmp(&line_length(b)));
+    let mut ways = vec![rounded(search, shortest)];
     for gap in gaps {
         if ways.len() >= wanted {
             break;
         }
-        if let Some(way) = search.shortest(&[gap])
-            && way.points.len() >= 2
-            && ways.iter().all(|known| known.points != way.points)
-        {
-            ways.push(way);
+        if let Some(way) = search.around(&[gap], longest) {
+            let way = rounded(search, way);
+            if ways.iter().all(|known| passes_differently(&known.points, &way.points, space)) {
+                ways.push(way);
+            }
         }
     }
     ways
+}
+
+/// The same path with finely rounded corners.
+fn rounded(search: &CornerSearch<'_>, path: CornerPath) -> CornerPath {
+    search.finer(&path, FINE).within(path.length()).unwrap_or(path)
 }
 
 /// The gaps between obstacles through which a path passes, one for each obstacle that it goes

@@ -3,7 +3,8 @@
 //!
 //! A path that keeps a margin `r` from a convex corner turns on an arc of radius `r` around it.
 //! The arc is replaced by points on a circle of radius `r / cos(δ/2)`, `δ` apart, so that the
-//! edges between neighbours just touch the arc.
+//! edges between neighbours just touch the arc. Where these have no room, `δ` is halved: in a
+//! passage that is hardly wide enough the path stays next to the arc.
 
 use super::polyline::{cross, distance};
 use crate::airspace::RegionId;
@@ -12,11 +13,14 @@ use crate::geodesy::Xy;
 
 use super::leg_space::LegSpace;
 
-/// The turn between neighbouring points around a corner, where there is room, radians.
-const COARSE: f64 = std::f64::consts::FRAC_PI_4;
+/// The turn between neighbouring points around a corner that is coarsely rounded, radians.
+pub const COARSE: f64 = std::f64::consts::FRAC_PI_4;
 
-/// The finest turn, taken where the coarser points have no room.
-const FINE: f64 = COARSE / 16.0;
+/// The same for a corner that is finely rounded: arcs are too long by 0.14 %.
+pub const FINE: f64 = COARSE / 6.0;
+
+/// Pieces of an arc are halved where their point has no room, down to this, radians.
+const FINEST: f64 = COARSE / 16.0;
 
 /// How far the tangents of a run of shallow corners may stand out from it, metres.
 const RUN_HEIGHT: f64 = 0.3;
@@ -36,29 +40,33 @@ pub struct Corner {
     pub half_turn: f64,
     /// The region that it goes round.
     pub region: RegionId,
+    /// The region that leaves no room at this corner, where there is one.
+    pub hidden_by: Option<RegionId>,
 }
 
-/// The corners of one boundary for the margin of a leg; only those that are clear themselves.
+/// The corners of one boundary for the margin of a leg, `step` radians apart where there is room
+/// and nearer where there is little. Where a part of a turn has no room at all, one corner says
+/// which region hides it.
 #[must_use]
-pub fn corners(region: RegionId, boundary: &Boundary, space: &LegSpace<'_>) -> Vec<Corner> {
+pub fn corners(
+    region: RegionId,
+    boundary: &Boundary,
+    space: &LegSpace<'_>,
+    step: f64,
+) -> Vec<Corner> {
     let mut found = Vec::new();
     match boundary {
         Boundary::Disc { centre, radius } => {
-            let reach = radius + space.planning_margin() + BEYOND;
-            let arc = Arc {
-                centre: *centre,
-                radius: reach,
-                from: 0.0,
-                turn: std::f64::consts::TAU,
-                region,
-            };
+            let radius = radius + space.planning_margin() + BEYOND;
+            let turn = std::f64::consts::TAU;
             // The points may stand out from a large disc no further than from a run of corners.
-            let coarse = (8.0 * RUN_HEIGHT / reach).sqrt().clamp(FINE, COARSE);
-            arc.push_points(coarse, space, &mut found);
+            let step = (8.0 * RUN_HEIGHT / radius).sqrt().clamp(FINEST, step);
+            Arc { centre: *centre, radius, from: 0.0, turn, region }
+                .corners(step, space, &mut found);
         }
         Boundary::Ring(ring) => {
             for arc in ring_arcs(ring, space.planning_margin() + BEYOND, region) {
-                arc.push_points(COARSE, space, &mut found);
+                arc.corners(step, space, &mut found);
             }
         }
     }
@@ -77,31 +85,44 @@ struct Arc {
 }
 
 impl Arc {
-    /// Adds the points of the arc, finer ones where the coarse ones have no room.
-    fn push_points(&self, coarse: f64, space: &LegSpace<'_>, found: &mut Vec<Corner>) {
-        let mut step = coarse;
-        loop {
-            let count = (self.turn / step).ceil().max(1.0);
-            let half_turn = self.turn / count / 2.0;
-            let points: Vec<Corner> = (0..count as u32)
-                .map(|k| {
-                    let (sin, cos) = (self.from + half_turn * f64::from(2 * k + 1)).sin_cos();
-                    let out = Xy { x: cos, y: sin };
-                    Corner {
-                        point: self.centre + out * (self.radius / half_turn.cos()),
-                        tangent: Xy { x: -sin, y: cos },
-                        half_turn,
-                        region: self.region,
-                    }
-                })
-                .collect();
-            let before = found.len();
-            found.extend(points.iter().filter(|corner| space.is_clear(corner.point, corner.point)));
-            if found.len() - before == points.len() || step <= FINE {
-                return;
-            }
-            found.truncate(before);
-            step /= 2.0;
+    /// Adds the corners of the arc.
+    fn corners(&self, step: f64, space: &LegSpace<'_>, found: &mut Vec<Corner>) {
+        let count = (self.turn / step).ceil().max(1.0);
+        let piece = self.turn / count;
+        for k in 0..count as u32 {
+            self.piece(self.from + piece * f64::from(k), piece, space, found);
+        }
+    }
+
+    /// Adds the corner where the tangents at both ends of a piece meet, or those of its halves
+    /// where that one has no room. Neighbouring corners see each other along a tangent, so the
+    /// pieces may be of different sizes.
+    fn piece(&self, from: f64, turn: f64, space: &LegSpace<'_>, found: &mut Vec<Corner>) {
+        let (sin, cos) = (from + turn / 2.0).sin_cos();
+        let out = Xy { x: cos, y: sin };
+        let corner = Corner {
+            point: self.centre + out * (self.radius / (turn / 2.0).cos()),
+            tangent: Xy { x: -sin, y: cos },
+            half_turn: turn / 2.0,
+            region: self.region,
+            hidden_by: None,
+        };
+        let margin = space.planning_margin();
+        let Some(hider) = space.airspace().blocker(corner.point, corner.point, margin) else {
+            found.push(corner);
+            return;
+        };
+        let middle = self.centre + out * self.radius;
+        // The whole piece of the arc is within this distance of its middle.
+        let chord = 2.0 * self.radius * (turn / 4.0).sin();
+        let covered = space.airspace().nearest(middle, middle, margin);
+        if let Some((_, hider)) = covered.filter(|(distance, _)| distance + chord < margin) {
+            found.push(Corner { hidden_by: Some(hider), ..corner });
+        } else if turn <= FINEST {
+            found.push(Corner { hidden_by: Some(hider), ..corner });
+        } else {
+            self.piece(from, turn / 2.0, space, found);
+            self.piece(from + turn / 2.0, turn / 2.0, space, found);
         }
     }
 }

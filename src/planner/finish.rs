@@ -1,31 +1,60 @@
 //! The finish: as few waypoints as needed, on the integers that the vehicle will fly, every edge
 //! judged once more against the unsimplified obstacles.
 
+use nalgebra::{Matrix2, Vector2};
+
 use super::leg_space::LegSpace;
-use super::polyline::{cross, distance, length, turn};
+use super::polyline::{distance, length, turn};
 use crate::airspace::RegionId;
 use crate::geodesy::{LatLon, LatLonE7, LocalFrame, ProjectionError, Xy};
 
-/// What saving one waypoint may cost, as a share of the path's length.
-const WORTH_OF_A_WAYPOINT: f64 = 1.5e-4;
+/// What all the waypoints that are saved may cost together, as a share of the path's length.
+pub const WORTH_OF_FEW: f64 = 4e-4;
 
 /// Turns below this are no corner, radians.
 const NO_TURN: f64 = 1e-6;
 
-/// Removes what a path does not need: corners that can be cut, and pairs of corners that one
-/// can replace at next to no cost in length. Edges stay clear.
+/// Edges whose directions differ by less than this angle have no meeting point, radians.
+const PARALLEL: f64 = 1e-9;
+
+/// Removes what a path does not need: corners that can be cut, and pairs of corners that one can
+/// replace, the cheapest first, as long as all of them together cost no more than `share` of
+/// the length. Edges stay clear.
 #[must_use]
-pub fn with_few_corners(path: &[Xy], space: &LegSpace<'_>) -> Vec<Xy> {
+pub fn with_few_corners(path: &[Xy], space: &LegSpace<'_>, share: f64) -> Vec<Xy> {
     let mut path = path.to_vec();
-    let allowance = WORTH_OF_A_WAYPOINT * length(&path);
+    cut_corners(&mut path, space);
+    let mut allowance = share * length(&path);
+    // What replacing the corners `k` and `k + 1` by one costs; `None` where that cannot be done.
+    let price = |path: &[Xy], k: usize| -> Option<(f64, Xy)> {
+        let [a, b, c, d] = *path.get(k.checked_sub(1)?..k + 3)? else { return None };
+        let meeting = meeting_point(a, b, c, d)?;
+        Some((distance(b, meeting) + distance(meeting, c) - distance(b, c), meeting))
+    };
+    let mut prices: Vec<_> = (0..path.len()).map(|k| price(&path, k)).collect();
     loop {
-        let before = path.len();
-        cut_corners(&mut path, space);
-        merge_corners(&mut path, space, allowance);
-        if path.len() == before {
-            return path;
+        let cheapest = prices
+            .iter()
+            .enumerate()
+            .filter_map(|(k, price)| price.map(|(extra, meeting)| (extra, k, meeting)))
+            .min_by(|x, y| x.0.total_cmp(&y.0));
+        let Some((extra, k, meeting)) = cheapest.filter(|cheapest| cheapest.0 <= allowance) else {
+            break;
+        };
+        if space.is_clear(path[k - 1], meeting) && space.is_clear(meeting, path[k + 2]) {
+            path[k] = meeting;
+            path.remove(k + 1);
+            prices.remove(k + 1);
+            allowance -= extra;
+            for near in k.saturating_sub(2)..(k + 3).min(path.len()) {
+                prices[near] = price(&path, near);
+            }
+        } else {
+            prices[k] = None;
         }
     }
+    cut_corners(&mut path, space);
+    path
 }
 
 /// Drops every corner whose neighbours see each other: the path only gets shorter.
@@ -42,35 +71,16 @@ fn cut_corners(path: &mut Vec<Xy>, space: &LegSpace<'_>) {
     }
 }
 
-/// Replaces neighbouring corners that turn the same way by the point where their outer edges
-/// meet, where that is clear and costs no more than `allowance` metres.
-fn merge_corners(path: &mut Vec<Xy>, space: &LegSpace<'_>, allowance: f64) {
-    let mut i = 1;
-    while i + 2 < path.len() {
-        let [a, b, c, d] = [path[i - 1], path[i], path[i + 1], path[i + 2]];
-        if let Some(meeting) = meeting_point(a, b, c, d)
-            && distance(b, meeting) + distance(meeting, c) - distance(b, c) <= allowance
-            && space.is_clear(a, meeting)
-            && space.is_clear(meeting, d)
-        {
-            path[i] = meeting;
-            path.remove(i + 1);
-        } else {
-            i += 1;
-        }
-    }
-}
-
-/// Where the edge `a`-`b`, lengthened beyond `b`, meets `d`-`c`, lengthened beyond `c`.
+/// Where the edge `a`-`b`, lengthened beyond `b`, meets `d`-`c`, lengthened beyond `c`: the
+/// solution of `a + t (b − a) = d + s (c − d)` with `t, s > 1`.
 fn meeting_point(a: Xy, b: Xy, c: Xy, d: Xy) -> Option<Xy> {
-    let (u, v) = (b - a, c - d);
-    let parallel = cross(u, v);
-    if parallel.abs() < 1e-9 * distance(a, b) * distance(c, d) {
+    let vector = |from: Xy, to: Xy| Vector2::new(to.x - from.x, to.y - from.y);
+    let (u, v) = (vector(a, b), vector(d, c));
+    if u.perp(&v).abs() < PARALLEL * u.norm() * v.norm() {
         return None;
     }
-    let t = cross(d - a, v) / parallel;
-    let s = cross(d - a, u) / parallel;
-    (t > 1.0 && s > 1.0).then(|| a + u * t)
+    let shares = Matrix2::from_columns(&[u, -v]).lu().solve(&vector(a, d))?;
+    (shares.x > 1.0 && shares.y > 1.0).then(|| a + (b - a) * shares.x)
 }
 
 /// A finished path: what the vehicle will fly.

@@ -114,9 +114,14 @@ impl<'a> GridSearch<'a> {
 
     /// A* from the start's cell to the goal's, with the Euclidean distance as the estimate.
     fn cheapest(&self, free: &mut [Option<bool>], price: &[f64]) -> Option<Vec<usize>> {
-        #[derive(PartialEq, PartialOrd)]
+        #[derive(PartialEq)]
         struct Ordered(f64);
         impl Eq for Ordered {}
+        impl PartialOrd for Ordered {
+            fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+                Some(self.cmp(other))
+            }
+        }
         impl Ord for Ordered {
             fn cmp(&self, other: &Self) -> std::cmp::Ordering {
                 self.0.total_cmp(&other.0)

@@ -15,11 +15,13 @@ pub struct LegSpace<'a> {
     margin: f64,
     /// Metres of deviation per square metre of edge length.
     deviation: f64,
+    /// What planning keeps beyond the margin, metres.
+    reserve: f64,
 }
 
 /// What planning keeps beyond the margin, metres: positions are rounded to 1e-7° (at most 8 mm
-/// off) before the result is judged, and long edges deviate by up to [`MAX_DEVIATION`].
-pub const PLANNING_RESERVE: f64 = 0.02 + MAX_DEVIATION;
+/// off) before the result is judged.
+const ROUNDING: f64 = 0.009;
 
 /// The deviation that an edge of a finished path may have, metres; longer edges are divided.
 pub const MAX_DEVIATION: f64 = 0.01;
@@ -34,7 +36,16 @@ impl<'a> LegSpace<'a> {
         // is straight on the map, which is apart from the geodesic by L² x / 8R² at a distance x
         // from the central meridian; 0.15 stands for x/R, far outside any zone.
         let tangent = latitude.abs().min(85.0).to_radians().tan();
-        Self { airspace, margin, deviation: (tangent + 0.15) / (8.0 * EARTH_RADIUS) }
+        let deviation = (tangent + 0.15) / (8.0 * EARTH_RADIUS);
+        Self { airspace, margin, deviation, reserve: ROUNDING + MAX_DEVIATION }
+    }
+
+    /// The same for planning with edges that are not much longer than `length` metres: they need
+    /// not keep more than these deviate.
+    #[must_use]
+    pub fn with_edges_up_to(mut self, length: f64) -> Self {
+        self.reserve = ROUNDING + self.flown_deviation(length).min(MAX_DEVIATION);
+        self
     }
 
     /// The airspace.
@@ -52,7 +63,7 @@ impl<'a> LegSpace<'a> {
     /// The margin that planned paths keep, local metres.
     #[must_use]
     pub fn planning_margin(&self) -> f64 {
-        self.margin + PLANNING_RESERVE
+        self.margin + self.reserve
     }
 
     /// How far the vehicle may be from the planned line on a straight edge, metres.

@@ -4,8 +4,9 @@
 //! - [`settings`]: the paper's table of settings and what may be changed;
 //! - [`leg_space`]: the airspace with the leg's margins;
 //! - [`polyline`]: lengths, turns, simplification;
-//! - [`corners`], [`search`]: shortest paths over the corners of obstacles;
+//! - [`corners`], `sweep`, [`search`]: shortest paths over the corners of obstacles;
 //! - [`grid`]: the paper's candidate grid;
+//! - [`homotopy`]: whether two paths pass obstacles on different sides;
 //! - [`candidates`]: structurally different candidates from both;
 //! - [`stations`]: segmentation into one edge a qubit;
 //! - [`trellis`]: two polylines as an Ising chain;
@@ -22,6 +23,7 @@ pub mod corners;
 pub mod enclosure;
 pub mod finish;
 pub mod grid;
+pub mod homotopy;
 pub mod leg;
 pub mod leg_space;
 pub mod moves;
@@ -30,6 +32,7 @@ pub mod rounds;
 pub mod search;
 pub mod settings;
 pub mod stations;
+mod sweep;
 pub mod trellis;
 
 pub use leg::{LegOutcome, LegPlan, LegPlanner, PlanError};

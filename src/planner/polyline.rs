@@ -5,7 +5,8 @@ use crate::geodesy::Xy;
 /// The distance between two points.
 #[must_use]
 pub fn distance(a: Xy, b: Xy) -> f64 {
-    (b.x - a.x).hypot(b.y - a.y)
+    let (dx, dy) = (b.x - a.x, b.y - a.y);
+    (dx * dx + dy * dy).sqrt()
 }
 
 /// The cross product of two vectors: positive where the second turns left of the first.

@@ -1,20 +1,22 @@
 //! Shortest path over the corners of obstacles: the candidate search that needs no grid.
 //!
-//! Only obstacles that bar something take part. The search starts with those on the straight
-//! line; every edge is tested against *all* obstacles, and what bars an edge that could have
-//! been part of a shorter path joins the next pass. When nothing new joins, no path over
-//! corners is shorter: a shorter one would also be a path among the obstacles that take part,
-//! and the pass would have tried it.
+//! Only obstacles that bar something take part. The search (A*, from the start) begins with those
+//! on the straight line; every edge is tested against *all* obstacles, and what bars an edge that
+//! could have been part of a shorter path joins at once: its corners are offered to every place
+//! that was reached before. When the goal is reached, no path over corners is shorter: its first
+//! edge that was not tried would have come up before.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap, HashMap};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use geo::{Intersects, Line};
+use rstar::{AABB, Envelope, RTree};
 
 use super::corners::{Corner, corners};
 use super::leg_space::LegSpace;
-use super::polyline::{cross, distance};
+use super::polyline::{cross, distance, distance_to_edge, length};
+use super::sweep::{Cone, Sight, sweep};
 use crate::airspace::RegionId;
 use crate::airspace::space::Boundary;
 use crate::geodesy::Xy;
@@ -22,12 +24,18 @@ use crate::geodesy::Xy;
 /// Corners and edges of one leg, found when they are needed and kept between searches.
 pub struct CornerSearch<'a> {
     space: LegSpace<'a>,
-    boundaries: HashMap<RegionId, Vec<Boundary>>,
-    active: BTreeSet<RegionId>,
+    /// By the number of their region.
+    boundaries: Vec<Vec<Boundary>>,
+    /// Whether a region takes part.
+    active: Vec<bool>,
+    /// The start, the goal, and the corners of the regions that take part.
     corners: Vec<Corner>,
-    start: Xy,
-    goal: Xy,
-    /// What bars the edge between two places, by their places in `corners` (start and goal last).
+    sights: RTree<Sight>,
+    /// The turn between neighbouring points of a rounded corner, radians.
+    step: f64,
+    /// Only corners this near to this path take part, where there is one.
+    along: Option<(Vec<Xy>, f64)>,
+    /// What bars the edge between two corners.
     tested: HashMap<(u32, u32), Option<RegionId>>,
     cancelled: &'a AtomicBool,
 }
@@ -42,14 +50,18 @@ pub struct CornerPath {
 }
 
 /// What an edge may be off a corner's tangent beyond the corner's own half turn, radians: where
-/// some points of a tight corner have no room, those that are left turn further.
-const TANGENT_SLACK: f64 = 0.4;
+/// parts of a tight corner have no room, the points that are left turn further.
+const TANGENT_SLACK: f64 = 0.1;
 
-/// A corner as it is passed: with its boundary on the left or on the right.
-type State = (u32, bool);
+/// A corner as it is passed: twice its number, plus one with its boundary on the left.
+type State = u32;
 
-const START: u32 = u32::MAX;
-const GOAL: u32 = u32::MAX - 1;
+/// The numbers of the start and of the goal.
+const START: u32 = 0;
+const GOAL: u32 = 1;
+
+/// Paths are compared with this tolerance, metres.
+const SAME: f64 = 1e-9;
 
 /// An edge to try, ordered by the length of the shortest path that may use it.
 #[derive(Clone, Copy, PartialEq)]
@@ -76,188 +88,387 @@ impl Ord for Offer {
     }
 }
 
+/// How a state was reached.
+#[derive(Debug, Clone, Copy)]
+struct Reached {
+    so_far: f64,
+    from: State,
+}
+
+/// The first look at a leg may miss the shortest path by this factor; it takes a small part of
+/// the time, and nothing longer than what it finds is looked at again.
+const GLANCE: f64 = 1.05;
+
+/// The most places that are looked at for the exact answer; a leg that needs more gets the first
+/// look's path, made exact in one window after the other.
+const PATIENCE: u32 = 8_000;
+
+/// How many windows a path is divided into; they overlap by half.
+const WINDOWS: usize = 8;
+
+/// One search: what was reached, and what is still to be tried.
+struct Pass<'s> {
+    shut: &'s [Line],
+    /// How much the way that is left counts: above 1 the search is quicker and less exact.
+    weight: f64,
+    /// Places that may still be looked at.
+    patience: u32,
+    /// Longer paths are of no interest, metres.
+    bound: f64,
+    reached: Vec<Option<Reached>>,
+    open: BinaryHeap<Reverse<Offer>>,
+}
+
 impl<'a> CornerSearch<'a> {
-    /// Prepares the search for a leg; `cancelled` ends it early, without a path.
+    /// Prepares the search for a leg, with corners rounded by points `step` radians apart;
+    /// `cancelled` ends it early, without a path.
     #[must_use]
-    pub fn new(space: LegSpace<'a>, start: Xy, goal: Xy, cancelled: &'a AtomicBool) -> Self {
-        let mut boundaries: HashMap<RegionId, Vec<Boundary>> = HashMap::new();
+    pub fn new(
+        space: LegSpace<'a>,
+        start: Xy,
+        goal: Xy,
+        step: f64,
+        cancelled: &'a AtomicBool,
+    ) -> Self {
+        let regions = space.airspace().outlines().len();
+        let mut boundaries: Vec<Vec<Boundary>> = vec![Vec::new(); regions];
         for (region, boundary) in space.airspace().boundaries() {
-            boundaries.entry(region).or_default().push(boundary);
+            boundaries[region.0 as usize].push(boundary);
         }
+        let end = |point: Xy| Corner {
+            point,
+            tangent: Xy { x: 1.0, y: 0.0 },
+            half_turn: std::f64::consts::PI,
+            region: RegionId(u32::MAX),
+            hidden_by: None,
+        };
         let mut search = Self {
             space,
             boundaries,
-            active: BTreeSet::new(),
-            corners: Vec::new(),
-            start,
-            goal,
+            active: vec![false; regions],
+            corners: vec![end(start), end(goal)],
+            sights: RTree::new(),
+            step,
+            along: None,
             tested: HashMap::new(),
             cancelled,
         };
-        let margin = space.planning_margin();
+        search.sights.insert(Sight::Corner(START, start));
         let on_the_way: BTreeSet<RegionId> = space
             .airspace()
             .barriers()
-            .within(Line::new(start, goal), margin)
+            .within(Line::new(start, goal), space.planning_margin())
             .map(|(_, barrier)| barrier.region)
             .collect();
-        search.activate(&on_the_way);
+        for region in on_the_way {
+            search.activate(region);
+        }
         search
     }
 
-    /// The shortest path over corners that crosses none of the `shut` lines, or `None`.
+    /// The same leg with corners rounded by points `step` radians apart, only along a path: what
+    /// it finds is that path with rounder corners.
     #[must_use]
-    pub fn shortest(&mut self, shut: &[Line]) -> Option<CornerPath> {
-        loop {
-            let (path, newcomers) = self.pass(shut);
-            if self.cancelled.load(Ordering::Relaxed) {
-                return None;
-            }
-            if !self.activate(&newcomers) {
-                return path;
-            }
+    pub fn finer(&self, path: &CornerPath, step: f64) -> Self {
+        // Coarse corners stand out from the arc by a tenth of the margin.
+        let beside = 0.2 * self.space.planning_margin() + 1.0;
+        let mut finer = Self {
+            space: self.space,
+            boundaries: self.boundaries.clone(),
+            active: vec![false; self.active.len()],
+            corners: self.corners[..2].to_vec(),
+            sights: RTree::new(),
+            step,
+            along: Some((path.points.clone(), beside)),
+            tested: HashMap::new(),
+            cancelled: self.cancelled,
+        };
+        finer.sights.insert(Sight::Corner(START, self.corners[0].point));
+        let passed: BTreeSet<RegionId> = path.corners.iter().map(|corner| corner.region).collect();
+        for region in passed {
+            finer.activate(region);
         }
+        finer
     }
 
-    /// Takes regions into the search; whether any of them was new.
-    fn activate(&mut self, regions: &BTreeSet<RegionId>) -> bool {
-        let mut any = false;
-        for &region in regions {
-            if self.active.insert(region) {
-                any = true;
-                for boundary in self.boundaries.get(&region).into_iter().flatten() {
-                    self.corners.extend(corners(region, boundary, &self.space));
+    /// The shortest path over corners; next to the shortest where the leg is a very large one.
+    #[must_use]
+    pub fn shortest(&mut self) -> Option<CornerPath> {
+        let glance = self.search(&[], f64::INFINITY, GLANCE, u32::MAX)?;
+        let bound = glance.length() + SAME;
+        if let Some(path) = self.search(&[], bound, 1.0, PATIENCE) {
+            return Some(path);
+        }
+        let ends = [START, GOAL].map(|end| self.corners[end as usize].point);
+        let path = self.in_windows(glance);
+        self.set_ends(ends);
+        Some(path)
+    }
+
+    /// A path that crosses none of the `shut` lines, no longer than `bound` metres and at most
+    /// 5 % longer than the shortest such; `None` where there is none.
+    #[must_use]
+    pub fn around(&mut self, shut: &[Line], bound: f64) -> Option<CornerPath> {
+        self.search(shut, bound, GLANCE, u32::MAX)
+    }
+
+    /// The shortest path that is no longer than `bound` metres, or `None`.
+    #[must_use]
+    pub fn within(&mut self, bound: f64) -> Option<CornerPath> {
+        self.search(&[], bound, 1.0, u32::MAX)
+    }
+
+    /// Makes a path exact within each of some windows.
+    fn in_windows(&mut self, mut path: CornerPath) -> CornerPath {
+        let window = path.length() / WINDOWS as f64;
+        let mut begin = 0.0;
+        while begin < path.length() - window {
+            // The vertices next to the window's ends.
+            let (mut along, mut first, mut last) = (0.0, 0, path.points.len() - 1);
+            for k in 1..path.points.len() {
+                along += distance(path.points[k - 1], path.points[k]);
+                if along <= begin {
+                    first = k;
+                }
+                if along >= begin + 2.0 * window {
+                    last = k;
+                    break;
+                }
+            }
+            begin += window;
+            let part = &path.points[first..=last];
+            self.set_ends([part[0], part[part.len() - 1]]);
+            if let Some(better) = self.search(&[], length(part) - SAME, 1.0, PATIENCE) {
+                path.points.splice(first..=last, better.points);
+                // The corners are those of the interior points.
+                path.corners.splice(first..last - 1, better.corners);
+            }
+        }
+        path
+    }
+
+    /// Searches between other ends from now on.
+    fn set_ends(&mut self, [start, goal]: [Xy; 2]) {
+        self.sights.remove(&Sight::Corner(START, self.corners[START as usize].point));
+        self.sights.insert(Sight::Corner(START, start));
+        self.corners[START as usize].point = start;
+        self.corners[GOAL as usize].point = goal;
+    }
+
+    fn search(
+        &mut self,
+        shut: &[Line],
+        bound: f64,
+        weight: f64,
+        patience: u32,
+    ) -> Option<CornerPath> {
+        let reached = vec![None; 2 * self.corners.len()];
+        let mut pass = Pass { shut, weight, patience, bound, reached, open: BinaryHeap::new() };
+        let start = 2 * START;
+        pass.reached[start as usize] = Some(Reached { so_far: 0.0, from: start });
+        self.expand(start, &mut pass);
+        let mut popped = 0u32;
+        while let Some(Reverse(offer)) = pass.open.pop() {
+            popped = popped.wrapping_add(1);
+            if popped.is_multiple_of(256) && self.cancelled.load(Ordering::Relaxed) {
+                return None;
+            }
+            if !pass.is_news(offer.to, offer.so_far) {
+                continue;
+            }
+            let (from, to) = (offer.from / 2, offer.to / 2);
+            let edge =
+                Line::new(self.corners[from as usize].point, self.corners[to as usize].point);
+            if shut.iter().any(|line| line.intersects(&edge)) {
+                continue;
+            }
+            if let Some(region) = self.barred(from, to) {
+                if self.activate(region) {
+                    pass.reached.resize(2 * self.corners.len(), None);
+                    self.offer_to_newcomers(region, &mut pass);
+                }
+                continue;
+            }
+            pass.reached[offer.to as usize] =
+                Some(Reached { so_far: offer.so_far, from: offer.from });
+            if to == GOAL {
+                return Some(self.path_to(offer.to, &pass));
+            }
+            pass.patience = pass.patience.checked_sub(1)?;
+            self.expand(offer.to, &mut pass);
+        }
+        None
+    }
+
+    /// Takes a region into the search; whether it is new there.
+    fn activate(&mut self, region: RegionId) -> bool {
+        let Some(active) = self.active.get_mut(region.0 as usize) else { return false };
+        if std::mem::replace(active, true) {
+            return false;
+        }
+        for boundary in &self.boundaries[region.0 as usize] {
+            for corner in corners(region, boundary, &self.space, self.step) {
+                let beside = self.along.as_ref().is_none_or(|(path, at_most)| {
+                    path.windows(2)
+                        .any(|edge| distance_to_edge(corner.point, edge[0], edge[1]) <= *at_most)
+                });
+                // What the region itself leaves no room for never will have any.
+                if beside && corner.hidden_by != Some(region) {
+                    self.sights.insert(Sight::Corner(self.corners.len() as u32, corner.point));
+                    self.corners.push(corner);
+                }
+            }
+            if let Boundary::Ring(ring) = boundary {
+                for (a, b) in crate::airspace::outline::edges(ring) {
+                    self.sights.insert(Sight::Wall(Line::new(a, b)));
                 }
             }
         }
-        any
+        true
     }
 
-    fn place(&self, index: u32) -> Xy {
-        match index {
-            START => self.start,
-            GOAL => self.goal,
-            index => self.corners[index as usize].point,
-        }
-    }
-
-    /// What bars the edge between two places; remembered.
+    /// What bars the edge between two corners; remembered.
     fn barred(&mut self, from: u32, to: u32) -> Option<RegionId> {
+        if let Some(hider) = self.corners[to as usize].hidden_by {
+            return Some(hider);
+        }
+        // The ends may move; only edges between corners are remembered.
         let key = (from.min(to), from.max(to));
         if let Some(&known) = self.tested.get(&key) {
             return known;
         }
-        let (a, b) = (self.place(from), self.place(to));
-        let found = self.space.airspace().blocker(a, b, self.space.planning_margin());
-        self.tested.insert(key, found);
+        let (a, b) = (self.corners[from as usize].point, self.corners[to as usize].point);
+        // Where an edge starts is known to be clear, so the side that it is on is known, too.
+        let found = self.space.airspace().blocker_from_inside(a, b, self.space.planning_margin());
+        if key.0 > GOAL {
+            self.tested.insert(key, found);
+        }
         found
     }
 
-    /// One search among the active regions. Also returns the inactive regions that barred an
-    /// edge which could have led to a shorter path.
-    fn pass(&mut self, shut: &[Line]) -> (Option<CornerPath>, BTreeSet<RegionId>) {
-        let mut newcomers = BTreeSet::new();
-        let mut reached: HashMap<State, (f64, State)> = HashMap::new();
-        let mut open = BinaryHeap::new();
-        let start: State = (START, false);
-        reached.insert(start, (0.0, start));
-        self.offer_from(start, None, 0.0, &reached, &mut open);
-        let mut popped = 0u32;
-        while let Some(Reverse(offer)) = open.pop() {
-            popped = popped.wrapping_add(1);
-            if popped.is_multiple_of(1024) && self.cancelled.load(Ordering::Relaxed) {
-                return (None, newcomers);
-            }
-            if reached.contains_key(&offer.to) {
-                continue;
-            }
-            let edge = Line::new(self.place(offer.from.0), self.place(offer.to.0));
-            if shut.iter().any(|line| line.intersects(&edge)) {
-                continue;
-            }
-            if let Some(region) = self.barred(offer.from.0, offer.to.0) {
-                if !self.active.contains(&region) {
-                    newcomers.insert(region);
-                }
-                continue;
-            }
-            reached.insert(offer.to, (offer.so_far, offer.from));
-            if offer.to.0 == GOAL {
-                return (Some(self.path_to(offer.to, &reached)), newcomers);
-            }
-            let heading = edge.end - edge.start;
-            self.offer_from(offer.to, Some(heading), offer.so_far, &reached, &mut open);
-        }
-        (None, newcomers)
-    }
-
-    /// Offers the edges that a taut path may take from a place: they leave close to the
+    /// Offers the edges that a taut path may take from a state: they leave close to the
     /// corner's tangent, bend towards its boundary, and arrive close to a tangent.
-    fn offer_from(
-        &self,
-        from: State,
-        heading: Option<Xy>,
-        so_far: f64,
-        reached: &HashMap<State, (f64, State)>,
-        open: &mut BinaryHeap<Reverse<Offer>>,
-    ) {
-        let here = self.place(from.0);
-        let leaving = self.corners.get(from.0 as usize).map(|corner| {
-            let tangent = if from.1 { corner.tangent } else { -corner.tangent };
-            (tangent, slack_cosine(corner.half_turn))
+    fn expand(&self, from: State, pass: &mut Pass<'_>) {
+        let Some(Reached { so_far, from: before }) = pass.reached[from as usize] else { return };
+        self.offer(from, 2 * GOAL, pass);
+        let corner = &self.corners[(from / 2) as usize];
+        let cone = if from / 2 == START {
+            Cone::ALL
+        } else {
+            let ahead = if from % 2 == 1 { corner.tangent } else { -corner.tangent };
+            let heading = corner.point - self.corners[(before / 2) as usize].point;
+            // Between straight on and the far end of the corner's turn.
+            let towards = ahead.y.atan2(ahead.x);
+            let straight = (cross(ahead, heading))
+                .atan2(ahead.x * heading.x + ahead.y * heading.y)
+                .clamp(-corner.half_turn - TANGENT_SLACK, corner.half_turn + TANGENT_SLACK);
+            let far = (corner.half_turn + TANGENT_SLACK) * if from % 2 == 1 { 1.0 } else { -1.0 };
+            let half = (far - straight).abs() / 2.0 + 1e-6;
+            Cone { towards: towards + f64::midpoint(straight, far), half }
+        };
+        let (place, goal) = (corner.point, self.corners[GOAL as usize].point);
+        let bound = pass.bound;
+        // The way there and on to the goal is at least as long as that over the nearest points.
+        let worth = |envelope: &AABB<[f64; 2]>| {
+            let far = |point: Xy| envelope.distance_2(&[point.x, point.y]).sqrt();
+            so_far + far(place) + far(goal) <= bound
+        };
+        sweep(&self.sights, place, cone, self.space.planning_margin(), worth, |to| {
+            if to != START && to != from / 2 {
+                self.offer(from, 2 * to, pass);
+                self.offer(from, 2 * to + 1, pass);
+            }
         });
-        let bends_well = |way: Xy, length: f64| {
-            let Some((tangent, cosine)) = leaving else { return true };
-            if way.x * tangent.x + way.y * tangent.y < cosine * length {
-                return false;
-            }
-            let bend = heading.map_or(0.0, |heading| cross(heading, way));
-            let slack = 1e-9 * length;
-            if from.1 { bend >= -slack } else { bend <= slack }
-        };
-        let mut push = |to: State, length: f64, rest: f64| {
-            if !reached.contains_key(&to) {
-                let so_far = so_far + length;
-                open.push(Reverse(Offer { estimate: so_far + rest, so_far, from, to }));
-            }
-        };
-        let way = self.goal - here;
-        let length = distance(here, self.goal);
-        if bends_well(way, length) {
-            push((GOAL, false), length, 0.0);
-        }
-        for (index, corner) in self.corners.iter().enumerate() {
-            let way = corner.point - here;
-            let length = distance(here, corner.point);
-            if length == 0.0 || !bends_well(way, length) {
-                continue;
-            }
-            let along = way.x * corner.tangent.x + way.y * corner.tangent.y;
-            if along.abs() >= slack_cosine(corner.half_turn) * length {
-                push((index as u32, along > 0.0), length, distance(corner.point, self.goal));
+    }
+
+    /// Offers the corners of a region that has just joined to all states that see them.
+    fn offer_to_newcomers(&self, region: RegionId, pass: &mut Pass<'_>) {
+        let first = self.corners.iter().rposition(|corner| corner.region != region);
+        let goal = self.corners[GOAL as usize].point;
+        for number in first.map_or(0, |k| k + 1)..self.corners.len() {
+            let (corner, bound) = (self.corners[number], pass.bound);
+            let worth = |envelope: &AABB<[f64; 2]>| {
+                let place = [corner.point.x, corner.point.y];
+                envelope.distance_2(&place).sqrt() + distance(corner.point, goal) <= bound
+            };
+            for side in 0..2 {
+                // Paths come from where the tangent of that side points back to.
+                let back = if side == 1 { -corner.tangent } else { corner.tangent };
+                let half = corner.half_turn + TANGENT_SLACK + 1e-6;
+                let cone = Cone { towards: back.y.atan2(back.x), half };
+                let margin = self.space.planning_margin();
+                let to = 2 * number as u32 + side;
+                sweep(&self.sights, corner.point, cone, margin, worth, |from| {
+                    for from in [2 * from, 2 * from + 1] {
+                        if pass.reached[from as usize].is_some() {
+                            self.offer(from, to, pass);
+                        }
+                    }
+                });
             }
         }
     }
 
-    fn path_to(&self, goal: State, reached: &HashMap<State, (f64, State)>) -> CornerPath {
-        let mut points = vec![self.goal];
-        let mut passed = Vec::new();
-        let mut state = goal;
-        while let Some(&(_, before)) = reached.get(&state) {
-            if before == state {
+    /// Offers one edge, if a taut path may take it.
+    fn offer(&self, from: State, to: State, pass: &mut Pass<'_>) {
+        let Some(Reached { so_far, from: before }) = pass.reached[from as usize] else { return };
+        let (here, there) = (&self.corners[(from / 2) as usize], &self.corners[(to / 2) as usize]);
+        let way = there.point - here.point;
+        let long = distance(here.point, there.point);
+        let (so_far, goal) = (so_far + long, self.corners[GOAL as usize].point);
+        let rest = distance(there.point, goal);
+        if long == 0.0 || so_far + rest > pass.bound || !pass.is_news(to, so_far) {
+            return;
+        }
+        let along = |corner: &Corner, state: State| {
+            let tangent = if state % 2 == 1 { corner.tangent } else { -corner.tangent };
+            way.x * tangent.x + way.y * tangent.y >= slack_cosine(corner.half_turn) * long
+        };
+        if from / 2 != START {
+            let bend = cross(here.point - self.corners[(before / 2) as usize].point, way);
+            let inwards = if from % 2 == 1 { bend } else { -bend };
+            if inwards < -SAME * long || !along(here, from) {
+                return;
+            }
+        }
+        if to / 2 != GOAL && !along(there, to) {
+            return;
+        }
+        let estimate = so_far + pass.weight * rest;
+        pass.open.push(Reverse(Offer { estimate, so_far, from, to }));
+    }
+
+    fn path_to(&self, goal: State, pass: &Pass<'_>) -> CornerPath {
+        let mut states = vec![goal];
+        while let Some(Reached { from, .. }) = pass.reached[states[states.len() - 1] as usize] {
+            if states[states.len() - 1] == from {
                 break;
             }
-            points.push(self.place(before.0));
-            passed.extend(self.corners.get(before.0 as usize).copied());
-            state = before;
+            states.push(from);
         }
-        points.reverse();
-        passed.reverse();
-        CornerPath { points, corners: passed }
+        let corners: Vec<Corner> =
+            states.iter().rev().map(|&state| self.corners[(state / 2) as usize]).collect();
+        let points = corners.iter().map(|corner| corner.point).collect();
+        CornerPath { points, corners: corners[1..corners.len() - 1].to_vec() }
+    }
+}
+
+impl CornerPath {
+    /// Metres.
+    #[must_use]
+    pub fn length(&self) -> f64 {
+        length(&self.points)
+    }
+}
+
+impl Pass<'_> {
+    /// Whether reaching a state in `so_far` metres would be better than anything before.
+    fn is_news(&self, state: State, so_far: f64) -> bool {
+        self.reached[state as usize].is_none_or(|reached| so_far < reached.so_far - SAME)
     }
 }
 
 /// The cosine of how far an edge may be off a corner's tangent.
 fn slack_cosine(half_turn: f64) -> f64 {
-    (half_turn + TANGENT_SLACK).cos()
+    (half_turn + TANGENT_SLACK).min(std::f64::consts::PI).cos()
 }

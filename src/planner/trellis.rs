@@ -145,9 +145,9 @@ impl Trellis {
             let mut next = [[f64::INFINITY; 2]; 2];
             for x in 0..2 {
                 for y in 0..if i + 1 < self.edges.len() { 2 } else { 1 } {
-                    for collided in 0..2 {
+                    for (collided, so_far) in best[x].iter().enumerate() {
                         let after = collided | usize::from(edge[x][y].collides);
-                        let cost = best[x][collided] + edge[x][y].energy(0.0);
+                        let cost = so_far + edge[x][y].energy(0.0);
                         next[y][after] = cost.min(next[y][after]);
                     }
                 }

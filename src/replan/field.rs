@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use geo::MultiPolygon;
+
 use super::Options;
 use crate::airspace::{Airspace, AirspaceError, Outline};
 use crate::fence::FenceSet;
@@ -14,8 +16,12 @@ use crate::planner::leg_space::LegSpace;
 pub struct Field {
     /// The zone.
     pub zone: Zone,
+    /// Where its local metres begin: the origin of its [`LocalFrame`].
+    pub origin: LatLon,
     /// The regions, by their index in the fence set.
     pub outlines: Vec<Outline>,
+    /// Where several inclusions are joined by `any`: what they allow together.
+    pub union: Option<MultiPolygon>,
     /// What paths keep from them, local metres.
     pub margin: f64,
 }
@@ -34,6 +40,7 @@ pub enum FieldError {
 /// A frame with the airspace in it.
 #[derive(Debug)]
 pub(super) struct Zoned {
+    origin: LatLon,
     pub(super) frame: LocalFrame,
     pub(super) airspace: Airspace,
     /// The largest scale at any end of a leg: see [`LocalFrame::scale_spread`].
@@ -74,7 +81,7 @@ impl Fields {
             let frame = LocalFrame::new(zone, origin)?;
             let spread = frame.scale_spread(&ends)?;
             let airspace = Airspace::new(fences, &frame, options.inclusion)?;
-            zones.insert(zone, Zoned { frame, airspace, spread });
+            zones.insert(zone, Zoned { origin, frame, airspace, spread });
         }
         Ok(Self { zones, forced: options.zone })
     }
@@ -96,7 +103,9 @@ impl Fields {
             .iter()
             .map(|(&zone, zoned)| Field {
                 zone,
+                origin: zoned.origin,
                 outlines: zoned.airspace.outlines().to_vec(),
+                union: zoned.airspace.union().cloned(),
                 margin: buffer * zoned.spread,
             })
             .collect()

@@ -1,6 +1,6 @@
 //! The verdict on a mission: every leg, as the vehicle flies it, against every region.
 
-use super::field::{Fields, Zoned};
+use super::field::{Field, Fields, Zoned};
 use super::reason::ReplanError;
 use super::{Input, Options};
 use crate::geodesy::{LatLon, geodesic_distance};
@@ -91,6 +91,17 @@ pub fn judge(input: &Input<'_>, options: &Options) -> Result<Verdict, ReplanErro
     let flown = legs(input.mission, &input.context())?;
     let fields = Fields::new(&flown.legs, input.fences, options)?;
     verdict(&flown, &fields, input, options)
+}
+
+/// The zones of a mission's legs with the fences in them, for a picture of a mission that was
+/// judged and not planned.
+///
+/// # Errors
+/// As [`judge`].
+pub fn fields(input: &Input<'_>, options: &Options) -> Result<Vec<Field>, ReplanError> {
+    let flown = legs(input.mission, &input.context())?;
+    let fields = Fields::new(&flown.legs, input.fences, options)?;
+    Ok(fields.pictured(options.settings.buffer.0))
 }
 
 pub(super) fn verdict(

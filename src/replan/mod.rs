@@ -2,7 +2,7 @@
 //! the judgement of what would really be flown.
 //!
 //! - [`field`]: frames and airspaces, one for each zone that the mission's legs are in;
-//! - [`judge`]: the verdict on any mission, leg by leg;
+//! - [`mod@judge`]: the verdict on any mission, leg by leg;
 //! - [`plan`]: re-planning with the judgement of its own result;
 //! - [`reason`]: why there is no plan, in words that name regions and legs.
 //!
@@ -21,7 +21,7 @@ use crate::mission::{Autopilot, FlightContext, LoiterHabit, Mission};
 use crate::planner::Settings;
 
 pub use field::{Field, FieldError};
-pub use judge::{LegVerdict, Verdict, judge};
+pub use judge::{LegVerdict, Verdict, fields, judge};
 pub use plan::{LegRecord, Progress, Replanned, replan};
 pub use reason::ReplanError;
 

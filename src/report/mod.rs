@@ -9,9 +9,13 @@
 //! Nothing here plans, judges or does I/O.
 
 pub mod json;
+pub mod picture;
 pub mod run;
 pub mod stretch;
 pub mod summary;
 mod text;
 
 pub use run::Run;
+
+#[cfg(test)]
+mod samples;

@@ -72,3 +72,29 @@ fn flown_clearance(places: &[LatLon], after: &Verdict) -> Option<Metres> {
         flown.reduce(Metres::min).map(|clearance| least.min(clearance))
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mission::legs::ReturnTo;
+    use crate::replan::Options;
+    use crate::report::samples;
+
+    #[test]
+    fn legs_that_share_inserted_waypoints_are_all_flown_over_them() {
+        let result = samples::planned_there_and_back(&Options::default());
+        let stretches = stretches(&result);
+        let to = |kind: LegKind| {
+            stretches.iter().find(|stretch| stretch.before.leg.kind == kind).unwrap()
+        };
+        let home = to(LegKind::Return(ReturnTo::Home));
+        let rally = to(LegKind::Return(ReturnTo::Rally(0)));
+        assert_eq!(home.before.leg.insert_before, rally.before.leg.insert_before);
+        assert_eq!(u8::from(home.record.is_some()) + u8::from(rally.record.is_some()), 1);
+        for stretch in [home, rally] {
+            assert!(stretch.replanned);
+            assert!(stretch.before.clearance.0 == 0.0 && stretch.clearance.0 >= 5.0);
+            assert!(stretch.length > stretch.before.length);
+        }
+    }
+}

@@ -2,16 +2,18 @@
 
 use super::run::Run;
 use super::stretch::stretches;
-use super::text::{Table, change, clearance, count, duration, leg_label, push_wrapped};
+use super::text::{
+    Table, change, clearance, count, duration, finding, leg_label, push_wrapped, unbroken,
+};
 use crate::planner::rounds::Round;
-use crate::replan::{LegRecord, Replanned, Verdict};
+use crate::replan::{LegRecord, LegVerdict, Replanned, Verdict};
 use crate::units::Metres;
 
 /// The summary of a mission that was planned.
 #[must_use]
 pub fn plan_summary(result: &Replanned, run: &Run<'_>) -> String {
     let (before, after) = (&result.before, &result.after);
-    let buffer = clearance(run.options.settings.buffer);
+    let buffer = unbroken(run.options.settings.buffer);
     let legs = before.legs.len();
     let headline = if result.is_changed() {
         format!(
@@ -96,24 +98,27 @@ fn time(record: &LegRecord) -> String {
 /// The summary of a judgement.
 #[must_use]
 pub fn check_summary(verdict: &Verdict, run: &Run<'_>) -> String {
-    let buffer = clearance(run.options.settings.buffer);
+    let buffer = unbroken(run.options.settings.buffer);
     let legs = verdict.legs.len();
-    let too_near: Vec<_> =
-        verdict.legs.iter().filter_map(|leg| Some((leg, leg.blocker.as_ref()?))).collect();
-    let colliding = too_near.iter().filter(|(_, (_, meets))| *meets).count();
+    let too_near: Vec<&LegVerdict> =
+        verdict.legs.iter().filter(|leg| leg.blocker.is_some()).collect();
+    let collides = |leg: &&&LegVerdict| matches!(leg.blocker, Some((_, true)));
+    let colliding = too_near.iter().filter(collides).count();
     let mut out = String::new();
     let headline = if too_near.is_empty() {
         format!("Clear: the whole mission ({}) keeps {buffer}.", count(legs, "leg"))
     } else {
-        let collisions = match colliding {
-            0 => "none of them meets an obstacle or leaves the fence".to_owned(),
-            1 => "1 of them meets an obstacle or leaves the fence".to_owned(),
-            n => format!("{n} of them meet an obstacle or leave the fence"),
+        let comes = if too_near.len() == 1 { "comes" } else { "come" };
+        let collide = match colliding {
+            0 => "none collides".to_owned(),
+            1 => "1 collides".to_owned(),
+            many => format!("{many} collide"),
         };
         format!(
-            "Not clear: {} of {} not keep {buffer}; {collisions}.",
+            "Not clear: {} of {} {comes} nearer than {buffer} to an obstacle or the fence, and \
+             {collide}.",
             too_near.len(),
-            if legs == 1 { "1 leg does".to_owned() } else { format!("{legs} legs do") },
+            count(legs, "leg"),
         )
     };
     push_wrapped(&mut out, &headline, 0);
@@ -126,13 +131,8 @@ pub fn check_summary(verdict: &Verdict, run: &Run<'_>) -> String {
     if !too_near.is_empty() {
         out.push('\n');
     }
-    for (leg, (region, meets)) in too_near {
-        let what = if *meets {
-            format!("meets {region}")
-        } else {
-            format!("comes within {} of {region}", clearance(leg.clearance))
-        };
-        push_wrapped(&mut out, &format!("The {} {what}.", leg.leg.name()), 4);
+    for leg in too_near {
+        push_wrapped(&mut out, &finding(leg), 4);
     }
     remarks(&mut out, run, &verdict.warnings);
     out
@@ -148,5 +148,83 @@ fn remarks<'a>(out: &mut String, run: &Run<'a>, warnings: impl IntoIterator<Item
     }
     for remark in remarks {
         push_wrapped(out, &remark, 4);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::replan::Options;
+    use crate::report::samples::{self, BARN, POND, YARD};
+    use crate::report::text::WIDTH;
+
+    fn fits(text: &str) {
+        for line in text.lines() {
+            assert!(line.chars().count() <= WIDTH, "{line}");
+            assert!(!line.chars().any(char::is_control), "{line:?}");
+        }
+    }
+
+    #[test]
+    fn a_plan_is_told_with_its_figures_before_and_after() {
+        let options = Options::default();
+        let result = samples::planned(POND, &options);
+        let text = plan_summary(&result, &samples::run(&options, &[]));
+        fits(&text);
+        assert!(text.starts_with("2 of 4 legs re-planned with "), "{text}");
+        let row = |head: &str| text.lines().find(|line| line.starts_with(head)).unwrap();
+        let lengths = [result.before.length(), result.after.length()].map(|m| m.to_string());
+        assert!(lengths.iter().all(|length| row("length").contains(length)), "{text}");
+        assert!(row("least clearance").contains("0.00 m"), "{text}");
+        assert!(row("free of collisions").ends_with("yes"), "{text}");
+        let places = [&result.before, &result.after].map(|v| v.places().len().to_string());
+        assert!(row("waypoints").ends_with(&places[1]) && row("waypoints").contains(&places[0]));
+        assert!(text.lines().any(|line| line.starts_with("1 - 2 ")), "{text}");
+        assert!(text.lines().any(|line| line.starts_with("3 - 4 ")), "{text}");
+    }
+
+    #[test]
+    fn a_mission_that_needs_nothing_says_so_and_has_no_clearance_without_regions() {
+        let options = Options::default();
+        let result = samples::planned_without_fences(BARN, &options);
+        let text = plan_summary(&result, &samples::run(&options, &[]));
+        fits(&text);
+        assert!(text.starts_with("Nothing to re-plan"), "{text}");
+        assert!(!text.contains("inf"), "{text}");
+    }
+
+    #[test]
+    fn fallback_and_warnings_fit_whatever_they_hold() {
+        let options = Options::default();
+        let result = samples::planned_without_fences(BARN, &options);
+        let warnings =
+            [format!("a file called {} is\todd\u{1b}[31m", "long".repeat(60)), "short".to_owned()];
+        let fallback = Some("the statevector engine instead of ibm: no token");
+        let run = Run { fallback, ..samples::run(&options, &warnings) };
+        let text = plan_summary(&result, &run);
+        fits(&text);
+        assert!(text.contains("fallback: the statevector engine"), "{text}");
+        assert!(text.contains("warning: short"), "{text}");
+    }
+
+    #[test]
+    fn a_judgement_says_which_legs_are_not_clear_and_why() {
+        let options = Options::default();
+        let (verdict, _) = samples::judged(YARD, &options);
+        let text = check_summary(&verdict, &samples::run(&options, &[]));
+        fits(&text);
+        assert!(text.starts_with("Not clear: 2 of 2 legs come nearer than 5.00 m"), "{text}");
+        let joined = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(joined.contains("and 2 collide."), "{text}");
+        assert!(joined.contains("The leg from item 1 to item 2 meets sample.plan"), "{text}");
+    }
+
+    #[test]
+    fn a_clear_mission_is_judged_clear() {
+        let options = Options::default();
+        let after = samples::planned(BARN, &options).after;
+        let text = check_summary(&after, &samples::run(&options, &[]));
+        fits(&text);
+        assert!(text.starts_with("Clear: the whole mission (5 legs) keeps 5.00 m."), "{text}");
     }
 }

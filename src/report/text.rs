@@ -4,10 +4,14 @@ use std::time::Duration;
 
 use crate::mission::Leg;
 use crate::mission::legs::{LegKind, ReturnTo, number as item_number};
+use crate::replan::LegVerdict;
 use crate::units::Metres;
 
 /// The width that everything fits into.
 pub(super) const WIDTH: usize = 80;
+
+/// A space that no line is broken at.
+pub(super) const UNBROKEN: char = '\u{a0}';
 
 /// Text from outside without what would control a terminal or is not allowed in XML.
 pub(super) fn plain(text: &str) -> String {
@@ -16,11 +20,12 @@ pub(super) fn plain(text: &str) -> String {
 }
 
 /// Appends a paragraph broken into lines of [`WIDTH`]; lines after the first are indented. A word
-/// that is longer than a line is broken as well.
+/// that is longer than a line is broken as well, a number stays with its unit ([`UNBROKEN`]).
 pub(super) fn push_wrapped(out: &mut String, text: &str, indent: usize) {
     let mut width = 0;
-    for word in plain(text).split_whitespace() {
-        let mut letters: Vec<char> = word.chars().collect();
+    for word in plain(text).split_ascii_whitespace() {
+        let mut letters: Vec<char> =
+            word.chars().map(|c| if c == UNBROKEN { ' ' } else { c }).collect();
         if width > 0 && width + 1 + letters.len() > WIDTH {
             out.push('\n');
             out.extend(std::iter::repeat_n(' ', indent));
@@ -49,6 +54,11 @@ pub(super) fn clearance(metres: Metres) -> String {
     }
     // 1e-6: what decimal fractions lose in binary.
     format!("{:.2} m", (metres.0 * 100.0 + 1e-6).floor() / 100.0)
+}
+
+/// A length to the centimetre that stays on one line.
+pub(super) fn unbroken(metres: Metres) -> String {
+    format!("{:.2}{UNBROKEN}m", metres.0)
 }
 
 /// The change from one length to another, such as `+6.9 %`; `-` where there is none to compare.
@@ -92,6 +102,18 @@ pub(super) fn leg_label(leg: &Leg) -> String {
     }
 }
 
+/// What is wrong with a leg, as a sentence.
+pub(super) fn finding(verdict: &LegVerdict) -> String {
+    let name = verdict.leg.name();
+    match &verdict.blocker {
+        None => format!("The {name} is clear."),
+        Some((region, true)) => format!("The {name} meets {region}."),
+        Some((region, false)) => {
+            format!("The {name} comes within {} of {region}.", clearance(verdict.clearance))
+        }
+    }
+}
+
 /// A table: the first column to the left, the others to the right, two spaces between them.
 pub(super) struct Table {
     rows: Vec<Vec<String>>,
@@ -126,5 +148,53 @@ impl Table {
             out.push_str(line.trim_end());
             out.push('\n');
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clearance_is_never_rounded_up() {
+        assert_eq!(clearance(Metres(4.999)), "4.99 m");
+        assert_eq!(clearance(Metres(5.0)), "5.00 m");
+        assert_eq!(clearance(Metres(0.29)), "0.29 m");
+        assert_eq!(clearance(Metres::INFINITY), "-");
+    }
+
+    #[test]
+    fn a_number_stays_on_the_line_of_its_unit() {
+        let mut out = String::new();
+        push_wrapped(&mut out, &format!("{} {}", "x".repeat(75), unbroken(Metres(5.0))), 2);
+        assert_eq!(out, format!("{}\n  5.00 m\n", "x".repeat(75)));
+    }
+
+    #[test]
+    fn a_word_longer_than_a_line_is_broken() {
+        let mut out = String::new();
+        push_wrapped(&mut out, &"y".repeat(100), 4);
+        assert_eq!(out, format!("{}\n    {}\n", "y".repeat(80), "y".repeat(20)));
+    }
+
+    #[test]
+    fn control_characters_do_not_reach_the_terminal() {
+        assert_eq!(plain("a\u{1b}[2Jb\u{9b}c"), "a\u{fffd}[2Jb\u{fffd}c");
+    }
+
+    #[test]
+    fn a_change_without_a_length_to_compare_is_left_out() {
+        assert_eq!(change(Metres(200.0), Metres(213.0)), "+6.5 %");
+        assert_eq!(change(Metres::ZERO, Metres::ZERO), "-");
+        assert_eq!(change(Metres::ZERO, Metres(3.0)), "-");
+    }
+
+    #[test]
+    fn columns_are_as_wide_as_their_widest_cell() {
+        let mut table = Table::new(["a", "value"]);
+        table.row(["longer".to_owned(), "1".to_owned()]);
+        let mut out = String::new();
+        table.push_to(&mut out);
+        assert_eq!(out, "a       value\nlonger      1\n");
     }
 }

@@ -4,7 +4,7 @@ use tokio::time::Instant;
 
 use super::Vehicle;
 use super::timing::Patience;
-use super::transfer::{Awaited, BusyWait, Exchange, Heard, MissionResult, TransferError};
+use super::transfer::{Awaited, BusyWait, Exchange, Heard, MissionResult, Refusal, TransferError};
 use crate::link::message::MissionClearAll;
 use crate::mission::MissionType;
 
@@ -23,24 +23,25 @@ impl Vehicle {
         loop {
             exchange.send(&clear).await?;
             let deadline = Instant::now() + self.timing.request;
-            match exchange.next_before(deadline).await? {
-                Some(Heard::Ack { result: MissionResult::ACCEPTED, .. }) => return Ok(()),
-                Some(Heard::Ack { result: MissionResult::DENIED, .. }) => {
-                    busy.pause(&exchange).await?;
-                    patience.renew();
-                }
-                Some(Heard::Ack { result, .. }) => match exchange.refusal(result, None).await? {
-                    Some(error) => return Err(error),
-                    None => return Ok(()),
-                },
-                // What is left of an earlier transfer.
-                Some(_) => {}
-                None => {
-                    if patience.is_exhausted(&self.timing) {
-                        let waited = patience.waited();
-                        return Err(exchange.no_answer(Awaited::Acknowledgement, waited));
+            while let Some(heard) = exchange.next_before(deadline).await? {
+                match heard {
+                    Heard::Ack { result: MissionResult::ACCEPTED, .. } => return Ok(()),
+                    Heard::Ack { result: MissionResult::DENIED, .. } => {
+                        busy.pause(&exchange).await?;
+                        patience.renew();
+                        break;
                     }
+                    Heard::Ack { result, .. } => match exchange.refusal(result, None).await? {
+                        Refusal::Meant(error) => return Err(error),
+                        Refusal::Accepted => return Ok(()),
+                        Refusal::Asked(_) => {}
+                    },
+                    // What is left of an earlier transfer.
+                    Heard::Count { .. } | Heard::Item(_) | Heard::Request(_) => {}
                 }
+            }
+            if exchange.is_hopeless(&mut patience) {
+                return Err(exchange.no_answer(Awaited::Acknowledgement, patience.waited()));
             }
         }
     }

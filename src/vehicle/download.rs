@@ -10,7 +10,7 @@ use super::discovery::Autopilot;
 use super::timing::Patience;
 use super::transfer::{
     Awaited, BusyWait, Direction, Exchange, Heard, MOST_ITEMS, MissionResult, OnProgress, Progress,
-    Setback, TransferError,
+    Refusal, Setback, TransferError,
 };
 use crate::link::message::{MissionAck, MissionRequestInt, MissionRequestList};
 use crate::mission::{MissionItem, MissionType};
@@ -82,42 +82,60 @@ async fn attempt(
 
 /// MISSION_REQUEST_LIST until there is a MISSION_COUNT.
 async fn count(exchange: &mut Exchange<'_>) -> Result<(u16, u32), Setback> {
-    let request =
-        MissionRequestList { target: exchange.target(), mission_type: exchange.wire_type() };
+    let (target, mission_type) = (exchange.target(), exchange.wire_type());
     let mut patience = Patience::new();
     let mut busy = BusyWait::default();
+    let mut unclear = None;
     loop {
-        exchange.send(&request).await?;
+        exchange.send(&MissionRequestList { target, mission_type }).await?;
         let asked = Instant::now();
-        match exchange.next_before(asked + exchange.timing().request).await? {
-            Some(Heard::Count { count, opaque_id }) => {
-                exchange.round_trip.measured(asked.elapsed());
-                if count > MOST_ITEMS {
-                    let mission_type = exchange.mission_type;
-                    return Err(TransferError::TooManyAnnounced { mission_type, count }.into());
+        while let Some(heard) = exchange.next_before(asked + exchange.timing().request).await? {
+            match heard {
+                Heard::Count { count, opaque_id } => {
+                    exchange.round_trip.measured(asked.elapsed());
+                    if count > MOST_ITEMS {
+                        let mission_type = exchange.mission_type;
+                        return Err(TransferError::TooManyAnnounced { mission_type, count }.into());
+                    }
+                    return Ok((count, opaque_id));
                 }
-                return Ok((count, opaque_id));
-            }
-            Some(Heard::Ack { result: MissionResult::DENIED, .. }) => {
-                busy.pause(exchange).await?;
-                patience.renew();
-            }
-            Some(Heard::Ack { result, .. })
-                if !matches!(result, MissionResult::ACCEPTED | MissionResult::INVALID_SEQUENCE) =>
-            {
-                if let Some(error) = exchange.refusal(result, None).await? {
-                    return Err(error.into());
+                Heard::Ack { result: MissionResult::DENIED, .. } => {
+                    busy.pause(exchange).await?;
+                    patience.renew();
+                    break;
                 }
-            }
-            // What is left of an earlier transfer.
-            Some(Heard::Ack { .. } | Heard::Item(_) | Heard::Request(_)) => {}
-            None => {
-                if patience.is_exhausted(exchange.timing()) {
-                    return Err(exchange.no_answer(Awaited::Count, patience.waited()).into());
+                // A refusal, or PX4's answer to something earlier: it counts if nothing better comes.
+                Heard::Ack { result: MissionResult::ERROR, .. } => {
+                    unclear = Some(MissionResult::ERROR);
                 }
+                Heard::Ack { result, .. } if is_refusal(result) => {
+                    if let Refusal::Meant(error) = exchange.refusal(result, None).await? {
+                        return Err(error.into());
+                    }
+                }
+                // What is left of an earlier transfer.
+                Heard::Ack { .. } | Heard::Item(_) | Heard::Request(_) => {}
             }
         }
+        if exchange.is_hopeless(&mut patience) {
+            if let Some(result) = unclear
+                && let Refusal::Meant(error) = exchange.refusal(result, None).await?
+            {
+                return Err(error.into());
+            }
+            return Err(exchange.no_answer(Awaited::Count, patience.waited()).into());
+        }
     }
+}
+
+/// Whether a result can be meant for a download. The others end or accompany uploads.
+fn is_refusal(result: MissionResult) -> bool {
+    !matches!(
+        result,
+        MissionResult::ACCEPTED
+            | MissionResult::INVALID_SEQUENCE
+            | MissionResult::OPERATION_CANCELLED
+    )
 }
 
 /// One request under way.
@@ -161,9 +179,11 @@ async fn items(
                 patience.renew();
                 tell(held.len());
             }
-            Some(Heard::Ack { result, .. }) if result != MissionResult::ACCEPTED => {
-                // PX4 lost the thread, or the plan is shorter than was announced.
-                if let Some(error) = exchange.refusal(result, None).await? {
+            // PX4 lost the thread, or the plan is shorter than was announced.
+            Some(Heard::Ack { result, .. })
+                if is_refusal(result) || result == MissionResult::INVALID_SEQUENCE =>
+            {
+                if let Refusal::Meant(error) = exchange.refusal(result, None).await? {
                     return Err(Setback::Again(error));
                 }
             }
@@ -171,7 +191,7 @@ async fn items(
             None => {
                 window = (window / 2).max(1);
                 let waiting = asked.keys().next().copied().unwrap_or(next);
-                if patience.is_exhausted(exchange.timing()) {
+                if exchange.is_hopeless(&mut patience) {
                     let error = exchange.no_answer(Awaited::Item(waiting), patience.waited());
                     return Err(Setback::Again(error));
                 }

@@ -86,10 +86,16 @@ impl Vehicle {
         waited.ok()?.ok().map(|state| state.clone())
     }
 
-    /// Whether a heartbeat came lately.
+    /// For how long nothing at all has come from it.
+    #[must_use]
+    pub fn silent_for(&self) -> Duration {
+        self.state.borrow().heard_at.elapsed()
+    }
+
+    /// Whether it was heard lately.
     #[must_use]
     pub fn is_alive(&self) -> bool {
-        self.state.borrow().heartbeat_at.elapsed() <= self.timing.heartbeat
+        self.silent_for() <= self.timing.silence
     }
 
     /// Stops following the vehicle. The link stays open.
@@ -99,3 +105,6 @@ impl Vehicle {
         let _ = self.monitor.await;
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -77,7 +77,7 @@ impl fmt::Display for Difference {
 ///   `_INT` twin, which mean the same in a MISSION_ITEM_INT;
 /// - ArduPilot: home in slot 0 of a mission; altitudes to the centimetre, those of rally points to
 ///   the metre; `autocontinue`; the frame, position and altitude of commands that have no place; in
-///   navigation commands the parameters that it drops or packs ([`ardupilot_keeps`]); in a fence
+///   navigation commands the parameters that it drops or packs (`ardupilot_keeps` below); in a fence
 ///   everything but command, position and `param1`;
 /// - PX4: yaw, kept in radians; in a fence all that a fence item has no use for.
 #[must_use]

@@ -8,11 +8,11 @@
 
 use std::fmt;
 
-use super::Vehicle;
 use super::discovery::Autopilot;
 use super::readback::{Difference, differences};
 use super::transfer::{OnProgress, Progress, TransferError};
 use super::upload::Uploaded;
+use super::{Vehicle, VehicleState};
 use crate::mission::{MissionItem, MissionType};
 use crate::store::{Beginning, Outcome, Record, Store, StoreError};
 
@@ -249,13 +249,13 @@ pub async fn replace(
     if let Some(record) = open_record(vehicle, store, mission_type).await? {
         return Err(Obstacle::Unsettled { path: store.path_of(&record) }.into());
     }
-    may_write(vehicle, while_armed)?;
+    may_write(vehicle, while_armed).await?;
     // Planning takes time: what somebody uploaded meanwhile must not be overwritten unsaved.
     let held = held(vehicle, mission_type, on_step).await?;
     if let Some(difference) = first_difference(vehicle, mission_type, &before, &held) {
         return Err(Obstacle::Changed { mission_type, difference }.into());
     }
-    may_write(vehicle, while_armed)?;
+    may_write(vehicle, while_armed).await?;
     let beginning = Beginning {
         vehicle: vehicle.node().system,
         autopilot: vehicle.autopilot(),
@@ -379,6 +379,7 @@ async fn settle_record(
     on_step: OnStep<'_>,
 ) -> Result<Settled, Obstacle> {
     let mission_type = record.mission_type;
+    is_there(vehicle)?;
     tokio::time::sleep(vehicle.timing.stragglers).await;
     let held = held(vehicle, mission_type, on_step).await?;
     let is = |plan: &[MissionItem]| first_difference(vehicle, mission_type, plan, &held).is_none();
@@ -387,7 +388,7 @@ async fn settle_record(
     } else if is(&record.intended) {
         (Settled::Finished, Outcome::Verified)
     } else if suspect == Suspect::Ourselves || is_mixture(vehicle.autopilot(), record, &held) {
-        may_write(vehicle, while_armed)?;
+        may_write(vehicle, while_armed).await?;
         put(vehicle, mission_type, &record.before, Step::PuttingBack, on_step).await?;
         (Settled::PutBack, Outcome::Restored)
     } else {
@@ -427,12 +428,19 @@ async fn put(
     uploading: fn(Progress) -> Step,
     on_step: OnStep<'_>,
 ) -> Result<(), Obstacle> {
-    let on_progress: OnProgress<'_> = &mut |progress| on_step(uploading(progress));
-    let uploaded = vehicle.upload(mission_type, items, on_progress).await?;
-    if uploaded == Uploaded::Unconfirmed {
-        tracing::warn!(plan = %mission_type, "the upload was not acknowledged; reading back");
+    let upload = async |on_step: OnStep<'_>| {
+        let on_progress: OnProgress<'_> = &mut |progress| on_step(uploading(progress));
+        vehicle.upload(mission_type, items, on_progress).await
+    };
+    let uploaded = upload(on_step).await?;
+    match (uploaded, prove(vehicle, mission_type, items, on_step).await) {
+        (Uploaded::Unconfirmed, Err(Obstacle::Mismatch { .. })) => {
+            tracing::warn!(plan = %mission_type, "the unacknowledged upload did not arrive; again");
+            upload(on_step).await?;
+            prove(vehicle, mission_type, items, on_step).await?;
+        }
+        (_, proof) => proof?,
     }
-    prove(vehicle, mission_type, items, on_step).await?;
     if mission_type == MissionType::Fence {
         tokio::time::sleep(vehicle.timing.fence_settles).await;
         prove(vehicle, mission_type, items, on_step).await?;
@@ -473,13 +481,21 @@ fn first_difference(
     differences(vehicle.autopilot(), mission_type, sent, held).into_iter().next()
 }
 
-/// Whether the vehicle is there and, unless allowed, its motors are off.
-fn may_write(vehicle: &Vehicle, while_armed: WhileArmed) -> Result<(), Obstacle> {
-    let state = vehicle.state();
-    if !vehicle.is_alive() {
-        let seconds = state.heartbeat_at.elapsed().as_secs_f64();
-        return Err(Obstacle::Silent { seconds });
+fn is_there(vehicle: &Vehicle) -> Result<(), Obstacle> {
+    if vehicle.is_alive() {
+        return Ok(());
     }
+    Err(Obstacle::Silent { seconds: vehicle.silent_for().as_secs_f64() })
+}
+
+/// Whether the vehicle is there and, unless allowed, its motors are off, by a heartbeat that is
+/// not old.
+async fn may_write(vehicle: &Vehicle, while_armed: WhileArmed) -> Result<(), Obstacle> {
+    let silence = vehicle.timing.silence;
+    let fresh = |state: &VehicleState| state.heartbeat_at.elapsed() <= silence / 2;
+    let Some(state) = vehicle.wait_for(silence, fresh).await else {
+        return Err(Obstacle::Silent { seconds: vehicle.silent_for().as_secs_f64() });
+    };
     if state.is_armed() && while_armed == WhileArmed::Refuse {
         return Err(Obstacle::Armed);
     }

@@ -28,6 +28,8 @@ pub struct VehicleState {
     pub heartbeat: Heartbeat,
     /// When that came.
     pub heartbeat_at: Instant,
+    /// When anything came from its autopilot. Does not wake who watches the state.
+    pub heard_at: Instant,
     /// Home, once the vehicle has one.
     pub home: Option<Home>,
     /// Where it is, once it knows.
@@ -49,7 +51,14 @@ pub struct Position {
 
 impl VehicleState {
     pub(super) fn new(heartbeat: Heartbeat, at: Instant) -> Self {
-        Self { heartbeat, heartbeat_at: at, home: None, position: None, mission_current: None }
+        Self {
+            heartbeat,
+            heartbeat_at: at,
+            heard_at: at,
+            home: None,
+            position: None,
+            mission_current: None,
+        }
     }
 
     /// Whether the motors may turn.
@@ -60,6 +69,7 @@ impl VehicleState {
 
     /// Takes in a frame of this vehicle's autopilot. `false` where it says nothing of interest.
     fn take(&mut self, received: &Received) -> bool {
+        self.heard_at = received.at;
         if let Some(heartbeat) = received.decode::<Heartbeat>() {
             self.heartbeat = heartbeat;
             self.heartbeat_at = received.at;

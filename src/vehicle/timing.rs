@@ -37,8 +37,8 @@ pub struct Timing {
     /// After a failed upload, before looking what it left: longer than a frame of it can still be
     /// under way on a slow network.
     pub stragglers: Duration,
-    /// A vehicle whose heartbeat is older than this is not there (heartbeats come at 1 Hz).
-    pub heartbeat: Duration,
+    /// A vehicle that has said nothing at all for this long is not there (heartbeats come at 1 Hz).
+    pub silence: Duration,
 }
 
 impl Default for Timing {
@@ -57,7 +57,7 @@ impl Default for Timing {
             explanation_age: Duration::from_secs(1),
             fence_settles: Duration::from_millis(1200),
             stragglers: Duration::from_secs(3),
-            heartbeat: Duration::from_secs(5),
+            silence: Duration::from_secs(5),
         }
     }
 }
@@ -114,10 +114,12 @@ impl Patience {
         *self = Self::new();
     }
 
-    /// Counts one more try without success. `true` when it is time to give up.
-    pub(super) fn is_exhausted(&mut self, timing: &Timing) -> bool {
+    /// Counts one more try without success. `true` when it is time to give up: after the retries
+    /// and the patience, or at once when the vehicle has been `silent` for as long as that.
+    pub(super) fn is_exhausted(&mut self, timing: &Timing, silent: Duration) -> bool {
         self.tries += 1;
-        self.tries > timing.retries && self.since.elapsed() >= timing.patience
+        silent >= timing.patience
+            || (self.tries > timing.retries && self.since.elapsed() >= timing.patience)
     }
 
     pub(super) fn waited(&self) -> Duration {
@@ -146,13 +148,15 @@ mod tests {
     async fn giving_up_takes_the_retries_and_the_patience() {
         let timing = Timing::default();
         let mut patience = Patience::new();
+        let heard = Duration::ZERO;
         for _ in 0..20 {
-            assert!(!patience.is_exhausted(&timing), "no time has passed");
+            assert!(!patience.is_exhausted(&timing, heard), "no time has passed");
         }
         tokio::time::advance(timing.patience).await;
-        assert!(patience.is_exhausted(&timing));
+        assert!(patience.is_exhausted(&timing, heard));
         patience.renew();
         tokio::time::advance(timing.patience).await;
-        assert!(!patience.is_exhausted(&timing), "tried once only");
+        assert!(!patience.is_exhausted(&timing, heard), "tried once only");
+        assert!(patience.is_exhausted(&timing, timing.patience), "nobody is there");
     }
 }

@@ -9,7 +9,7 @@ use tokio::time::{Instant, timeout_at};
 
 use super::Vehicle;
 use super::text::TextLog;
-use super::timing::{RoundTrip, Timing};
+use super::timing::{Patience, RoundTrip, Timing};
 use crate::link::message::{
     MissionAck, MissionCount, MissionItemInt, MissionRequest, MissionRequestInt, StatusText,
 };
@@ -287,29 +287,45 @@ impl<'a> Exchange<'a> {
         is_ours.then_some(heard)
     }
 
-    /// Waits for the words that belong to a refusal. They come before or after it.
-    ///
-    /// Returns `None` where an ACCEPTED arrives after all: on a line that repeats or reorders, the
-    /// "error" was the answer to a repeated last item.
+    /// Looks closer at an acknowledgement that says no: waits for the words that belong to it,
+    /// which come before or after it, and for signs that it was not meant for this transfer.
     pub(super) async fn refusal(
         &mut self,
         result: MissionResult,
         item: Option<u16>,
-    ) -> Result<Option<TransferError>, TransferError> {
+    ) -> Result<Refusal, TransferError> {
         let deadline = Instant::now() + self.timing().explanation;
         while let Some(heard) = self.next_before(deadline).await? {
-            if matches!(heard, Heard::Ack { result: MissionResult::ACCEPTED, .. }) {
-                return Ok(None);
+            match heard {
+                Heard::Ack { result: MissionResult::ACCEPTED, .. } => return Ok(Refusal::Accepted),
+                Heard::Request(seq) => return Ok(Refusal::Asked(seq)),
+                Heard::Ack { .. } | Heard::Count { .. } | Heard::Item(_) => {}
             }
         }
         let age = self.timing().explanation + self.timing().explanation_age;
         let texts = self.texts.recent(age);
-        Ok(Some(TransferError::Refused { mission_type: self.mission_type, result, item, texts }))
+        let mission_type = self.mission_type;
+        Ok(Refusal::Meant(TransferError::Refused { mission_type, result, item, texts }))
+    }
+
+    /// Counts one more wait that was in vain. `true` when it is time to give up.
+    pub(super) fn is_hopeless(&self, patience: &mut Patience) -> bool {
+        patience.is_exhausted(self.timing(), self.vehicle.silent_for())
     }
 
     pub(super) fn no_answer(&self, awaited: Awaited, waited: Duration) -> TransferError {
         TransferError::NoAnswer { mission_type: self.mission_type, awaited, waited }
     }
+}
+
+/// What an acknowledgement that says no turns out to be, on a line that repeats and reorders.
+pub(super) enum Refusal {
+    /// A refusal.
+    Meant(TransferError),
+    /// The answer to a repeated last item: the first one was accepted.
+    Accepted,
+    /// Left from earlier: the vehicle goes on asking for items.
+    Asked(u16),
 }
 
 /// What ends one attempt at a transfer.

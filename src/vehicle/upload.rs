@@ -10,7 +10,7 @@ use super::discovery::Autopilot;
 use super::timing::Patience;
 use super::transfer::{
     Awaited, BusyWait, Direction, Exchange, Heard, MOST_ITEMS, MissionResult, OnProgress, Progress,
-    Setback, TransferError,
+    Refusal, Setback, TransferError,
 };
 use crate::link::message::{MissionCount, MissionItemInt};
 use crate::mission::{MissionItem, MissionType};
@@ -45,8 +45,14 @@ impl Vehicle {
         let mut restarts = 0;
         loop {
             let mut exchange = Exchange::new(self, mission_type)?;
-            let mut upload =
-                Upload { exchange: &mut exchange, items, count, last_sent: None, tries: 0 };
+            let mut upload = Upload {
+                exchange: &mut exchange,
+                items,
+                count,
+                last_sent: None,
+                tries: 0,
+                is_unasked: false,
+            };
             match upload.attempt(on_progress).await {
                 Ok(uploaded) => {
                     tracing::debug!(plan = %mission_type, items = count, ?uploaded, "uploaded");
@@ -57,6 +63,8 @@ impl Vehicle {
                 {
                     restarts += 1;
                     tracing::warn!(plan = %mission_type, %error, "upload begun again");
+                    // What is under way of the old attempt is no answer to the new one.
+                    tokio::time::sleep(self.timing.stragglers).await;
                 }
                 Err(Setback::Again(error) | Setback::Final(error)) => return Err(error),
             }
@@ -73,6 +81,16 @@ struct Upload<'a, 'v> {
     last_sent: Option<u16>,
     /// How often that one was sent.
     tries: u32,
+    /// Whether it was last sent because the line was quiet, not because it was asked for.
+    is_unasked: bool,
+}
+
+/// What follows an acknowledgement.
+enum Next {
+    Done(Uploaded),
+    Send(u16),
+    Offer,
+    Wait,
 }
 
 impl Upload<'_, '_> {
@@ -89,7 +107,10 @@ impl Upload<'_, '_> {
         let mut busy = BusyWait::default();
         loop {
             match self.exchange.next_before(deadline).await? {
-                Some(Heard::Request(seq)) if seq < self.count => {
+                Some(Heard::Request(seq)) => {
+                    if seq >= self.count {
+                        continue;
+                    }
                     if self.last_sent.is_none_or(|last| seq > last) {
                         if self.tries <= 1 {
                             self.exchange.round_trip.measured(sent_at.elapsed());
@@ -98,27 +119,29 @@ impl Upload<'_, '_> {
                         tell(usize::from(seq));
                     }
                     self.send_item(seq).await?;
-                    sent_at = Instant::now();
+                    self.is_unasked = false;
                 }
-                Some(Heard::Ack { result, .. }) => {
-                    if let Some(uploaded) = self.acknowledged(result, &mut busy).await? {
+                Some(Heard::Ack { result, .. }) => match self.judge(result, &mut busy).await? {
+                    Next::Done(uploaded) => {
                         tell(total);
                         return Ok(uploaded);
                     }
-                    if self.last_sent.is_some() {
-                        continue; // noise: the running wait goes on
+                    Next::Send(seq) => {
+                        self.send_item(seq).await?;
+                        self.is_unasked = false;
                     }
-                    sent_at = Instant::now();
-                }
-                Some(Heard::Request(_) | Heard::Count { .. } | Heard::Item(_)) => continue,
+                    Next::Offer => self.offer().await?,
+                    Next::Wait => continue,
+                },
+                Some(Heard::Count { .. } | Heard::Item(_)) => continue,
                 None => {
-                    if patience.is_exhausted(timing) {
+                    if self.exchange.is_hopeless(&mut patience) {
                         return self.silence(&patience);
                     }
                     self.repeat().await?;
-                    sent_at = Instant::now();
                 }
             }
+            sent_at = Instant::now();
             let wait = match self.last_sent {
                 None => timing.request,
                 Some(_) => self.exchange.round_trip.item_wait(timing),
@@ -163,39 +186,59 @@ impl Upload<'_, '_> {
     async fn repeat(&mut self) -> Result<(), TransferError> {
         match self.last_sent {
             None => self.offer().await,
-            Some(seq) => self.send_item(seq).await,
+            Some(seq) => {
+                self.is_unasked = true;
+                self.send_item(seq).await
+            }
         }
     }
 
-    /// What an acknowledgement means at this point. `None`: go on.
-    async fn acknowledged(
-        &mut self,
-        result: MissionResult,
-        busy: &mut BusyWait,
-    ) -> Result<Option<Uploaded>, Setback> {
+    /// ArduPilot says "invalid sequence" of an item that it has already, and carries on. That is
+    /// noise where the line repeated a frame; where quavd has just repeated the item because the
+    /// line was quiet, it tells that the request for the next one was lost, which ArduPilot would
+    /// repeat after a second only.
+    fn request_was_lost(&self) -> Option<u16> {
+        let next = self.last_sent? + 1;
+        let ardupilot = self.exchange.vehicle.autopilot == Autopilot::ArduPilot;
+        (ardupilot && self.is_unasked && next < self.count).then_some(next)
+    }
+
+    /// What to do about an acknowledgement.
+    async fn judge(&mut self, result: MissionResult, busy: &mut BusyWait) -> Result<Next, Setback> {
         match result {
-            MissionResult::ACCEPTED if self.all_sent() => Ok(Some(Uploaded::Acknowledged)),
-            // Of an earlier transfer; or ArduPilot's word for an item that it has already. It
-            // carries on after saying so.
-            MissionResult::ACCEPTED | MissionResult::INVALID_SEQUENCE => Ok(None),
+            MissionResult::ACCEPTED if self.all_sent() => Ok(Next::Done(Uploaded::Acknowledged)),
+            MissionResult::INVALID_SEQUENCE => {
+                Ok(self.request_was_lost().map_or(Next::Wait, Next::Send))
+            }
+            // Left of an earlier transfer: before the end nothing is accepted, before the first
+            // request there is nothing to cancel, and after it the upload is ours.
+            MissionResult::ACCEPTED => Ok(Next::Wait),
+            MissionResult::OPERATION_CANCELLED if self.last_sent.is_none() => Ok(Next::Wait),
+            MissionResult::DENIED if self.last_sent.is_some() => Ok(Next::Wait),
             result if self.last_sent.is_none() && self.means_busy(result) => {
                 busy.pause(self.exchange).await?;
-                self.offer().await?;
-                Ok(None)
+                Ok(Next::Offer)
             }
-            result => {
-                let Some(error) = self.exchange.refusal(result, self.last_sent).await? else {
-                    return Ok(self.all_sent().then_some(Uploaded::Acknowledged));
-                };
-                if result == MissionResult::OPERATION_CANCELLED {
-                    return Err(Setback::Again(error));
-                }
-                if result == MissionResult::ERROR && self.all_sent() && self.tries > 1 {
-                    // Perhaps it only says that it no longer waits for the repeated last item.
-                    return Ok(Some(Uploaded::Unconfirmed));
-                }
-                Err(Setback::Final(error))
+            result => match self.exchange.refusal(result, self.last_sent).await? {
+                Refusal::Accepted if self.all_sent() => Ok(Next::Done(Uploaded::Acknowledged)),
+                Refusal::Accepted => Ok(Next::Wait),
+                Refusal::Asked(seq) if seq < self.count => Ok(Next::Send(seq)),
+                Refusal::Asked(_) => Ok(Next::Wait),
+                Refusal::Meant(error) => self.refused(result, error),
+            },
+        }
+    }
+
+    fn refused(&self, result: MissionResult, error: TransferError) -> Result<Next, Setback> {
+        match result {
+            // Perhaps it only says that it no longer waits for the repeated last item.
+            MissionResult::ERROR if self.all_sent() && self.tries > 1 => {
+                Ok(Next::Done(Uploaded::Unconfirmed))
             }
+            // It knows of no upload any more: it has restarted, or given up.
+            MissionResult::ERROR if self.is_unasked => Err(Setback::Again(error)),
+            MissionResult::OPERATION_CANCELLED => Err(Setback::Again(error)),
+            _ => Err(Setback::Final(error)),
         }
     }
 

@@ -1,9 +1,13 @@
 //! Integration tests, one binary. [`sitl`] starts the fake vehicle; the other modules are one
 //! user-visible promise each.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
+mod bad_links;
+mod campaign;
 mod commands;
+mod compare;
 mod replacing;
+mod scenes;
 mod sitl;
 mod transfers;

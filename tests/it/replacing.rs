@@ -29,7 +29,7 @@ impl Scene {
     async fn new(persona: &str) -> Self {
         let mut fake = FakeVehicle::start(&["--persona", persona]);
         fake.set(MISSION, &(0..12).map(waypoint).collect::<Vec<_>>());
-        let session = Session::open_with(&fake.endpoint(), quick()).await;
+        let session = Session::open(&fake.endpoint(), quick()).await;
         let before = download(&session.vehicle).await;
         let dumped = fake.held(MISSION);
         Self { fake, session, directory: tempfile::tempdir().unwrap(), before, dumped }
@@ -63,7 +63,7 @@ impl Scene {
 
     async fn again(&mut self) {
         let endpoint = self.fake.endpoint();
-        let session = Session::open_with(&endpoint, quick()).await;
+        let session = Session::open(&endpoint, quick()).await;
         std::mem::replace(&mut self.session, session).close().await;
     }
 
@@ -76,7 +76,12 @@ impl Scene {
 /// Shorter waits than in the field: the fake vehicle is near.
 fn quick() -> quav::vehicle::Search {
     let second = std::time::Duration::from_secs(1);
-    let timing = Timing { patience: 2 * second, stragglers: second / 10, ..Timing::default() };
+    let timing = Timing {
+        patience: 2 * second,
+        silence: 3 * second,
+        stragglers: second / 10,
+        ..Timing::default()
+    };
     quav::vehicle::Search { timing, ..search() }
 }
 

@@ -37,9 +37,10 @@ pub(crate) fn python() -> PathBuf {
 }
 
 impl FakeVehicle {
-    /// Starts one that listens on UDP.
+    /// Starts one that listens on UDP. Its random faults are the same each time, unless
+    /// `--seed` says otherwise.
     pub(crate) fn start(arguments: &[&str]) -> Self {
-        Self::start_on("udpin:127.0.0.1:0", arguments)
+        Self::start_on("udpin:127.0.0.1:0", &[&["--seed", "1"], arguments].concat())
     }
 
     /// Starts one with a link of a certain kind.
@@ -47,7 +48,7 @@ impl FakeVehicle {
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("sitl/fake_vehicle.py");
         let mut process = Command::new(python())
             .arg(script)
-            .args(["--control", "0", "--exit-on-stdin-eof", "--seed", "1", "--link", link])
+            .args(["--control", "0", "--exit-on-stdin-eof", "--link", link])
             .args(arguments)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
@@ -84,11 +85,6 @@ impl FakeVehicle {
         self.control(&json!({"cmd": "fault", "spec": spec}));
     }
 
-    /// Takes all faults away.
-    pub(crate) fn clear_faults(&mut self) {
-        self.control(&json!({"cmd": "clear-faults"}));
-    }
-
     /// Puts a plan into the vehicle, as another ground station would.
     pub(crate) fn set(&mut self, mission_type: MissionType, items: &[MissionItem]) {
         let items: Vec<Value> = items.iter().map(item_json).collect();
@@ -123,11 +119,7 @@ pub(crate) struct Session {
 }
 
 impl Session {
-    pub(crate) async fn open(endpoint: &Endpoint) -> Self {
-        Self::open_with(endpoint, Search::default()).await
-    }
-
-    pub(crate) async fn open_with(endpoint: &Endpoint, search: Search) -> Self {
+    pub(crate) async fn open(endpoint: &Endpoint, search: Search) -> Self {
         let transport = Transport::open(endpoint).await.unwrap();
         let (link, task) = Link::start(transport, Identity::default(), CancellationToken::new());
         let vehicle = find(&link, &search).await.unwrap();

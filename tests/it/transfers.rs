@@ -11,7 +11,7 @@ use crate::sitl::{FakeVehicle, PERSONAS, Session, place, search, triangle, waypo
 /// Uploads a mission of 20 items, downloads it, and looks into the vehicle itself.
 async fn mission_there_and_back(link: &str, persona: &str) {
     let mut fake = FakeVehicle::start_on(link, &["--persona", persona]);
-    let session = Session::open_with(&fake.endpoint(), search()).await;
+    let session = Session::open(&fake.endpoint(), search()).await;
     let vehicle = &session.vehicle;
     let mission = Mission { home: None, items: (0..20).map(waypoint).collect() };
     let sent = to_vehicle(vehicle.autopilot(), &mission, None);
@@ -60,7 +60,7 @@ async fn a_mission_goes_there_and_back_over_a_serial_line() {
 async fn a_fence_goes_there_and_back_and_an_empty_list_clears_it() {
     for persona in PERSONAS {
         let mut fake = FakeVehicle::start(&["--persona", persona]);
-        let session = Session::open_with(&fake.endpoint(), search()).await;
+        let session = Session::open(&fake.endpoint(), search()).await;
         let vehicle = &session.vehicle;
         let sent = triangle();
         vehicle.upload(MissionType::Fence, &sent, &mut |_| {}).await.unwrap();

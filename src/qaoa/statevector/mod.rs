@@ -1,10 +1,10 @@
 //! The engine for any 2-local Ising problem: all 2ⁿ amplitudes.
 //!
-//! A layer is two passes over memory, each on parts that fit into cache (`layout`): the Walsh–Hadamard
-//! transform of one half of the qubits, the diagonal factor that meets there (the phase of the energies
-//! for plain amplitudes, the mixer's eigenvalues for transformed ones), and the transform back (`walsh`,
-//! `energies`, `kernels`). `evolution` strings the passes together, on all threads of the current rayon
-//! pool; results do not depend on their number.
+//! A layer is two passes over memory, in place and on parts that fit into cache (`layout`): the
+//! Walsh–Hadamard transform of one half of the qubits, the diagonal factor that meets there (the phase of
+//! the energies for plain amplitudes, the mixer's eigenvalues for transformed ones), and the transform
+//! back (`walsh`, `energies`, `kernels`). `evolution` strings the passes together, on all threads of the
+//! current rayon pool; results do not depend on their number.
 
 mod energies;
 mod evolution;
