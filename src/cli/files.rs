@@ -149,6 +149,22 @@ pub fn write_all(
     Ok(())
 }
 
+/// Writes the picture to those of the files that are pictures.
+///
+/// # Errors
+/// As [`write_all`].
+pub fn write_pictures(
+    paths: &[PathBuf],
+    picture: impl Fn() -> Result<String, ProjectionError>,
+) -> Result<(), CliError> {
+    let pictures: Vec<PathBuf> = paths
+        .iter()
+        .filter(|path| matches!(out_format(path), Ok(OutFormat::Svg)))
+        .cloned()
+        .collect();
+    write_all(&pictures, &Scenario::default(), picture)
+}
+
 /// Replaces a file by new content, whole or not at all.
 ///
 /// # Errors

@@ -142,7 +142,8 @@ async fn with_vehicle(
     let load = began.elapsed();
     let planned = plan_off_thread(&read, &options, shown).await;
     let warnings = &read.scenario.warnings;
-    let outcome = Outcome { planned, options: &options, warnings, load, total: began.elapsed() };
+    let total = began.elapsed();
+    let outcome = Outcome { planned, before: None, options: &options, warnings, load, total };
 
     let mut done = Delivery { written: false, verified: false };
     if let Ok(planned) = &outcome.planned {

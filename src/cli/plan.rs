@@ -13,10 +13,10 @@ use super::options::PlanningArgs;
 use super::progress::Shown;
 use crate::formats::Scenario;
 use crate::geodesy::LatLon;
-use crate::replan::{Input, Options, Progress, Replanned, replan};
+use crate::replan::{Input, Options, Progress, Replanned, Verdict, fields, judge, replan};
 use crate::report::Run;
 use crate::report::json::PlanDocument;
-use crate::report::picture::picture;
+use crate::report::picture::{Subject, picture};
 use crate::report::summary::plan_summary;
 
 /// The arguments of `quavd plan`.
@@ -65,12 +65,28 @@ pub fn run(args: &PlanArgs, shown: &Shown) -> Result<String, CliError> {
     let planned = replan(&input, &options, &AtomicBool::new(false), watch);
     let planned = planned.map_err(CliError::from);
     shown.clear();
+    let before = match &planned {
+        Err(CliError::NoPath { .. }) => judge(&input, &options).ok(),
+        _ => None,
+    };
     let warnings = &scenario.warnings;
-    let outcome = Outcome { planned, options: &options, warnings, load, total: began.elapsed() };
-    if let Ok(planned) = &outcome.planned {
-        files::write_all(&args.out, &planned_scenario(&scenario, planned), || {
-            picture(planned, &outcome.run(), &name_of(&args.scenario))
-        })?;
+    let total = began.elapsed();
+    let outcome = Outcome { planned, before, options: &options, warnings, load, total };
+    let title = name_of(&args.scenario);
+    match (&outcome.planned, &outcome.before) {
+        (Ok(planned), _) => {
+            files::write_all(&args.out, &planned_scenario(&scenario, planned), || {
+                picture(planned, &outcome.run(), &title)
+            })?;
+        }
+        // Without a plan there is nothing to fly, but a picture shows what is in the way.
+        (Err(_), Some(before)) => {
+            let fields = fields(&input, &options)?;
+            files::write_pictures(&args.out, || {
+                picture(Subject::judged(before, &fields), &outcome.run(), &title)
+            })?;
+        }
+        (Err(_), None) => {}
     }
     outcome.told(args.json, None)
 }
@@ -93,6 +109,8 @@ pub(super) fn planned_scenario(scenario: &Scenario, planned: &Replanned) -> Scen
 /// What planning came to, to be told to a person or a program.
 pub(super) struct Outcome<'a> {
     pub(super) planned: Result<Replanned, CliError>,
+    /// The verdict on the original, where there is no plan.
+    pub(super) before: Option<Verdict>,
     pub(super) options: &'a Options,
     /// What was odd about the input.
     pub(super) warnings: &'a [String],
@@ -152,7 +170,12 @@ impl Outcome<'_> {
             }
             Err(CliError::NoPath { reason, .. }) => {
                 let document = json
-                    .then(|| document(PlanDocument::failed(reason, None, &run), delivered))
+                    .then(|| {
+                        document(
+                            PlanDocument::failed(reason, self.before.as_ref(), &run),
+                            delivered,
+                        )
+                    })
                     .transpose()?;
                 Err(CliError::NoPath { reason: reason.clone(), document })
             }

@@ -11,7 +11,7 @@ use std::collections::{BTreeSet, BinaryHeap, HashMap};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use geo::{Intersects, Line};
-use rstar::{AABB, Envelope, RTree};
+use rstar::{AABB, RTree};
 
 use super::corners::{Corner, corners};
 use super::leg_space::LegSpace;
@@ -107,8 +107,7 @@ const PATIENCE: u32 = 8_000;
 const WINDOWS: usize = 8;
 
 /// One search: what was reached, and what is still to be tried.
-struct Pass<'s> {
-    shut: &'s [Line],
+struct Pass {
     /// How much the way that is left counts: above 1 the search is quicker and less exact.
     weight: f64,
     /// Places that may still be looked at.
@@ -263,7 +262,7 @@ impl<'a> CornerSearch<'a> {
         patience: u32,
     ) -> Option<CornerPath> {
         let reached = vec![None; 2 * self.corners.len()];
-        let mut pass = Pass { shut, weight, patience, bound, reached, open: BinaryHeap::new() };
+        let mut pass = Pass { weight, patience, bound, reached, open: BinaryHeap::new() };
         let start = 2 * START;
         pass.reached[start as usize] = Some(Reached { so_far: 0.0, from: start });
         self.expand(start, &mut pass);
@@ -348,7 +347,7 @@ impl<'a> CornerSearch<'a> {
 
     /// Offers the edges that a taut path may take from a state: they leave close to the
     /// corner's tangent, bend towards its boundary, and arrive close to a tangent.
-    fn expand(&self, from: State, pass: &mut Pass<'_>) {
+    fn expand(&self, from: State, pass: &mut Pass) {
         let Some(Reached { so_far, from: before }) = pass.reached[from as usize] else { return };
         self.offer(from, 2 * GOAL, pass);
         let corner = &self.corners[(from / 2) as usize];
@@ -382,7 +381,7 @@ impl<'a> CornerSearch<'a> {
     }
 
     /// Offers the corners of a region that has just joined to all states that see them.
-    fn offer_to_newcomers(&self, region: RegionId, pass: &mut Pass<'_>) {
+    fn offer_to_newcomers(&self, region: RegionId, pass: &mut Pass) {
         let first = self.corners.iter().rposition(|corner| corner.region != region);
         let goal = self.corners[GOAL as usize].point;
         for number in first.map_or(0, |k| k + 1)..self.corners.len() {
@@ -410,7 +409,7 @@ impl<'a> CornerSearch<'a> {
     }
 
     /// Offers one edge, if a taut path may take it.
-    fn offer(&self, from: State, to: State, pass: &mut Pass<'_>) {
+    fn offer(&self, from: State, to: State, pass: &mut Pass) {
         let Some(Reached { so_far, from: before }) = pass.reached[from as usize] else { return };
         let (here, there) = (&self.corners[(from / 2) as usize], &self.corners[(to / 2) as usize]);
         let way = there.point - here.point;
@@ -438,7 +437,7 @@ impl<'a> CornerSearch<'a> {
         pass.open.push(Reverse(Offer { estimate, so_far, from, to }));
     }
 
-    fn path_to(&self, goal: State, pass: &Pass<'_>) -> CornerPath {
+    fn path_to(&self, goal: State, pass: &Pass) -> CornerPath {
         let mut states = vec![goal];
         while let Some(Reached { from, .. }) = pass.reached[states[states.len() - 1] as usize] {
             if states[states.len() - 1] == from {
@@ -461,7 +460,7 @@ impl CornerPath {
     }
 }
 
-impl Pass<'_> {
+impl Pass {
     /// Whether reaching a state in `so_far` metres would be better than anything before.
     fn is_news(&self, state: State, so_far: f64) -> bool {
         self.reached[state as usize].is_none_or(|reached| so_far < reached.so_far - SAME)

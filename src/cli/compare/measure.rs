@@ -11,7 +11,7 @@ use crate::geodesy::Xy;
 use crate::planner::leg::LegRequest;
 use crate::planner::leg_space::LegSpace;
 use crate::planner::{LegOutcome, LegPlanner, Settings};
-use crate::report::json::RoundDocument;
+use crate::report::json::leg::RoundDocument;
 use crate::units::Metres;
 
 /// A path that keeps all of the buffer but this much is not said to collide, metres: positions are

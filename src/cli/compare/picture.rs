@@ -9,7 +9,7 @@ use svg::node::element::{Line, Polyline, Rectangle, Text};
 
 use super::ScenarioResult;
 use super::measure::Method;
-use crate::report::json::RoundDocument;
+use crate::report::json::leg::RoundDocument;
 
 const WIDTH: f64 = 760.0;
 const HEIGHT: f64 = 440.0;
