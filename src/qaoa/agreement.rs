@@ -185,6 +185,6 @@ fn what_an_engine_cannot_do_is_an_error_with_the_figure() {
     let large = Ising::new(0.0, vec![1.0; 40], vec![]).unwrap();
     assert!(matches!(
         StatevectorEngine::new(&large, Precision::Double, MEMORY),
-        Err(EngineError::Memory { qubits: 40, needed: 52_776_558_133_248, .. })
+        Err(EngineError::Memory { qubits: 40, needed: 35_184_388_866_048, .. })
     ));
 }

@@ -1,9 +1,9 @@
 //! Arithmetic on four numbers at once, and the one place where the processor is asked what it can do.
 //!
-//! Kernels are written in plain Rust over [`F4`]; [`run`] has them compiled a second time for AVX2. No
-//! operation is fused or reordered by that, so results are the same to the last bit on every processor.
+//! Kernels are written in plain Rust over [`F4`]; [`run`] has them compiled again for AVX2 and AVX-512.
+//! No operation is fused or reordered by that, so results are the same to the last bit on every processor.
 //! Closures and the array methods that take them are avoided in kernels: they are not always inlined,
-//! and then not compiled for AVX2.
+//! and then not compiled for these.
 
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
@@ -160,21 +160,39 @@ pub(super) trait Kernel {
 /// Runs a kernel with the widest instructions this processor has.
 pub(super) fn run<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
-    if std::is_x86_feature_detected!("avx2") {
-        return with_avx2(kernel);
+    {
+        if std::is_x86_feature_detected!("avx512f") && std::is_x86_feature_detected!("avx512vl") {
+            return x86::with_avx512(kernel);
+        }
+        if std::is_x86_feature_detected!("avx2") {
+            return x86::with_avx2(kernel);
+        }
     }
     kernel.run()
 }
 
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
-fn with_avx2<K: Kernel>(kernel: K) -> K::Output {
-    #[target_feature(enable = "avx2")]
-    fn compiled_for_avx2<K: Kernel>(kernel: K) -> K::Output {
-        kernel.run()
+mod x86 {
+    use super::Kernel;
+
+    pub(super) fn with_avx512<K: Kernel>(kernel: K) -> K::Output {
+        #[target_feature(enable = "avx512f,avx512vl")]
+        fn compiled<K: Kernel>(kernel: K) -> K::Output {
+            kernel.run()
+        }
+        // SAFETY: only called by `run`, after the processor has said that it has both.
+        unsafe { compiled(kernel) }
     }
-    // SAFETY: only called by `run`, after the processor has said that it has AVX2.
-    unsafe { compiled_for_avx2(kernel) }
+
+    pub(super) fn with_avx2<K: Kernel>(kernel: K) -> K::Output {
+        #[target_feature(enable = "avx2")]
+        fn compiled<K: Kernel>(kernel: K) -> K::Output {
+            kernel.run()
+        }
+        // SAFETY: only called by `run`, after the processor has said that it has AVX2.
+        unsafe { compiled(kernel) }
+    }
 }
 
 #[cfg(test)]

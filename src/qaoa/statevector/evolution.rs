@@ -1,17 +1,13 @@
 //! The state through the layers of a circuit, and back with its adjoint for the derivatives: after the
 //! forward pass λ = Hψ, then every layer is taken off ψ and λ again, so that no layer is stored.
 
-use std::mem::swap;
-
 use rayon::prelude::*;
 
 use super::super::angles::Angles;
 use super::super::ising::Ising;
 use super::super::simd;
 use super::energies::Energies;
-use super::kernels::{
-    Energy, First, Mix, Mixer, Phase, Phases, Plain, Spectrum, Turn, Unmix, Unphase,
-};
+use super::kernels::{Energy, First, Mix, Mixer, Phase, Phases, Plain, Turn, Unmix, Unphase};
 use super::layout::{Amplitudes, Layout};
 use super::vector::Vector;
 
@@ -24,7 +20,6 @@ pub(super) struct Evolution<V> {
     low_vectors: Vec<V>,
     state: Amplitudes<V>,
     adjoint: Amplitudes<V>,
-    scratch: Amplitudes<V>,
 }
 
 impl<V: Vector> Evolution<V> {
@@ -41,7 +36,6 @@ impl<V: Vector> Evolution<V> {
             low_vectors,
             state: Amplitudes::default(),
             adjoint: Amplitudes::default(),
-            scratch: Amplitudes::default(),
         }
     }
 
@@ -50,43 +44,30 @@ impl<V: Vector> Evolution<V> {
         1_u64.checked_shl(Layout::new::<V>(qubits).qubits() as u32).unwrap_or(u64::MAX)
     }
 
-    /// The state before its last mixer's transform is undone, in tiles.
+    /// Runs the circuit up to the last mixer, whose low qubits are still transformed.
     fn forward(&mut self, angles: &Angles) {
-        let Self { layout, energies, low_energies, state, scratch, .. } = self;
+        let Self { layout, energies, low_energies, state, .. } = self;
         let layout = &*layout;
         state.reserve(layout);
-        scratch.reserve(layout);
         for (layer, (&gamma, &beta)) in angles.gammas().iter().zip(angles.betas()).enumerate() {
             let phases = &Phases::new(low_energies, gamma);
-            if layer == 0 {
-                state.parts(layout.row).enumerate().for_each(|(row, out)| {
-                    simd::run(First { energies, layout, phases, row, out });
-                });
-            } else {
-                let from = &*state;
-                scratch.parts(layout.row).enumerate().for_each(|(row, out)| {
-                    simd::run(Phase { energies, layout, phases, row, from, out });
-                });
-                swap(state, scratch);
-            }
-            let mixer = &Mixer::new(layout.qubits(), beta);
-            let from = &*state;
-            scratch.parts(layout.tile()).enumerate().for_each(|(tile, out)| {
-                simd::run(Mix { layout, mixer, tile, from, out });
+            state.rows(layout).enumerate().for_each(|(row, state)| {
+                if layer == 0 {
+                    simd::run(First { energies, layout, phases, row, state });
+                } else {
+                    simd::run(Phase { energies, layout, phases, row, state });
+                }
             });
-            swap(state, scratch);
+            let mixer = &Mixer::new(layout.qubits(), beta);
+            let groups = state.columns(layout).into_par_iter();
+            groups.for_each(|state| simd::run(Mix { layout, mixer, state }));
         }
     }
 
-    /// Runs the circuit; the state is then plain, in rows.
+    /// Runs the circuit.
     pub(super) fn run(&mut self, angles: &Angles) {
         self.forward(angles);
-        let Self { layout, state, scratch, .. } = self;
-        let from = &*state;
-        scratch.parts(layout.row).enumerate().for_each(|(row, out)| {
-            simd::run(Plain { layout, row, from, out });
-        });
-        swap(state, scratch);
+        self.state.rows(&self.layout).for_each(|state| simd::run(Plain { state }));
     }
 
     /// ⟨H⟩ after [`Self::run`].
@@ -102,63 +83,32 @@ impl<V: Vector> Evolution<V> {
     /// ⟨H⟩ and its derivatives. Leaves no state behind.
     pub(super) fn gradient(&mut self, angles: &Angles) -> (f64, Angles) {
         self.forward(angles);
-        let Self { layout, energies, low_energies, low_vectors, state, adjoint, scratch } = self;
-        let (layout, low_vectors) = (&*layout, &*low_vectors);
+        let Self { layout, energies, low_energies, low_vectors, state, adjoint } = self;
+        let (layout, energies) = (&*layout, &*energies);
         adjoint.reserve(layout);
         let mut gradient = Angles::zeros(angles.layers());
 
-        let from = &*state;
-        let rows = scratch.parts(layout.row).zip(adjoint.parts(layout.row)).enumerate();
+        let rows = state.rows(layout).zip(adjoint.rows(layout)).enumerate();
         let expectation = in_order(rows.map(|(row, (state, adjoint))| {
-            simd::run(Turn {
-                energies,
-                low_energies: low_vectors,
-                layout,
-                row,
-                from,
-                state,
-                adjoint,
-            })
+            simd::run(Turn { energies, low_energies: low_vectors, row, state, adjoint })
         }));
-        swap(state, scratch);
-
         for layer in (0..angles.layers()).rev() {
-            let from = &*state;
-            scratch.parts(layout.tile()).enumerate().for_each(|(tile, out)| {
-                simd::run(Spectrum { layout, tile, from, out });
-            });
-            swap(state, scratch);
-            let (mixer, from) = (&Mixer::new(layout.qubits(), -angles.betas()[layer]), &*adjoint);
-            let tiles = scratch.parts(layout.tile()).zip(state.parts(layout.tile())).enumerate();
-            let slope = in_order(tiles.map(|(tile, (adjoint, state))| {
-                simd::run(Unmix { layout, mixer, tile, from, adjoint, state })
-            }));
+            let mixer = &Mixer::new(layout.qubits(), -angles.betas()[layer]);
+            let (states, adjoints) = (state.columns(layout), adjoint.columns(layout));
+            let groups = states.into_par_iter().zip(adjoints);
+            let slope = in_order(
+                groups.map(|(state, adjoint)| simd::run(Unmix { layout, mixer, state, adjoint })),
+            );
             gradient.betas_mut()[layer] = 2.0 * slope;
-            swap(adjoint, scratch);
 
-            let from = &*state;
-            scratch.parts(layout.row).enumerate().for_each(|(row, out)| {
-                simd::run(Plain { layout, row, from, out });
-            });
-            swap(state, scratch);
             let phases = (layer > 0).then(|| Phases::new(low_energies, -angles.gammas()[layer]));
-            let (phases, from) = (phases.as_ref(), &*adjoint);
-            let rows = scratch.parts(layout.row).zip(state.parts(layout.row)).enumerate();
-            let slope = in_order(rows.map(|(row, (adjoint, state))| {
-                let low_energies = low_vectors;
-                simd::run(Unphase {
-                    energies,
-                    low_energies,
-                    layout,
-                    phases,
-                    row,
-                    from,
-                    adjoint,
-                    state,
-                })
+            let phases = phases.as_ref();
+            let rows = state.rows(layout).zip(adjoint.rows(layout)).enumerate();
+            let slope = in_order(rows.map(|(row, (state, adjoint))| {
+                let low_energies = &*low_vectors;
+                simd::run(Unphase { energies, low_energies, layout, phases, row, state, adjoint })
             }));
             gradient.gammas_mut()[layer] = 2.0 * slope;
-            swap(adjoint, scratch);
         }
         (expectation, gradient)
     }

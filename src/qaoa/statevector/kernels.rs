@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::super::simd::Kernel;
 use super::energies::{Energies, Row};
-use super::layout::{Amplitudes, Layout, Part};
+use super::layout::{Columns, Layout, Part};
 use super::vector::Vector;
 use super::walsh;
 
@@ -85,11 +85,11 @@ impl Mixer {
 
     /// The factors of one tile's columns for each number of ones among the high bits.
     #[inline(always)]
-    fn columns<V: Vector>(&self, layout: &Layout, tile: usize) -> Vec<(V, V)> {
+    fn columns<V: Vector>(&self, layout: &Layout, column: usize) -> Vec<(V, V)> {
         let mut factors = Vec::with_capacity((layout.high + 1) * layout.width);
         for ones in 0..=layout.high {
             for vector in 0..layout.width {
-                let start = (tile * layout.width + vector) * V::LANES;
+                let start = (column + vector) * V::LANES;
                 let at = |lane: usize| self.by_ones[ones + (start + lane).count_ones() as usize];
                 factors.push((V::from_fn(|lane| at(lane).0), V::from_fn(|lane| at(lane).1)));
             }
@@ -117,7 +117,7 @@ pub(super) struct First<'a, V> {
     pub(super) layout: &'a Layout,
     pub(super) phases: &'a Phases<V>,
     pub(super) row: usize,
-    pub(super) out: Part<'a, V>,
+    pub(super) state: Part<'a, V>,
 }
 
 impl<V: Vector> Kernel for First<'_, V> {
@@ -125,24 +125,27 @@ impl<V: Vector> Kernel for First<'_, V> {
 
     #[inline(always)]
     fn run(self) {
-        let Self { energies, layout, phases, row, mut out } = self;
+        let Self { energies, layout, phases, row, mut state } = self;
         let (mut re, mut im) = (vec![V::ZERO; layout.row], vec![V::ZERO; layout.row]);
         phases.row(&energies.row(row), (&mut re, &mut im));
-        out.re.fill(V::splat(0.5_f64.powi(layout.qubits() as i32).sqrt()));
-        out.im.fill(V::ZERO);
-        phases.apply((&re, &im), &mut out);
-        walsh::forward(out.re);
-        walsh::forward(out.im);
+        state.re.fill(V::splat(0.5_f64.powi(layout.qubits() as i32).sqrt()));
+        state.im.fill(V::ZERO);
+        phases.apply((&re, &im), &mut state);
+        forward(&mut state);
     }
 }
 
-/// One mixer on a tile.
+#[inline(always)]
+fn transform_tile<V: Vector>(layout: &Layout, tile: &mut Part<'_, V>) {
+    walsh::columns(tile.re, layout.width);
+    walsh::columns(tile.im, layout.width);
+}
+
+/// One mixer on a group of columns.
 pub(super) struct Mix<'a, V> {
     pub(super) layout: &'a Layout,
     pub(super) mixer: &'a Mixer,
-    pub(super) tile: usize,
-    pub(super) from: &'a Amplitudes<V>,
-    pub(super) out: Part<'a, V>,
+    pub(super) state: Columns<'a, V>,
 }
 
 impl<V: Vector> Kernel for Mix<'_, V> {
@@ -150,54 +153,27 @@ impl<V: Vector> Kernel for Mix<'_, V> {
 
     #[inline(always)]
     fn run(self) {
-        let Self { layout, mixer, tile, from, mut out } = self;
-        let factors = mixer.columns::<V>(layout, tile);
-        transformed_tile(layout, from, tile, &mut out);
-        scale_tile(&factors, layout, &mut out);
-        walsh::columns(out.re, layout.width);
-        walsh::columns(out.im, layout.width);
+        let Self { layout, mixer, mut state } = self;
+        let (mut re, mut im) = (vec![V::ZERO; layout.tile()], vec![V::ZERO; layout.tile()]);
+        let tile = &mut Part { re: &mut re, im: &mut im };
+        for column in (0..state.width()).step_by(layout.width) {
+            let factors = mixer.columns::<V>(layout, state.start + column);
+            state.read(column, layout.width, tile);
+            transform_tile(layout, tile);
+            scale_tile(&factors, layout, tile);
+            transform_tile(layout, tile);
+            state.write(column, layout.width, tile);
+        }
     }
 }
 
-#[inline(always)]
-fn transformed_tile<V: Vector>(
-    layout: &Layout,
-    from: &Amplitudes<V>,
-    tile: usize,
-    out: &mut Part<'_, V>,
-) {
-    layout.gather_tile(&from.re, tile, out.re);
-    layout.gather_tile(&from.im, tile, out.im);
-    walsh::columns(out.re, layout.width);
-    walsh::columns(out.im, layout.width);
-}
-
-/// A tile of amplitudes, transformed for the mixer.
-pub(super) struct Spectrum<'a, V> {
-    pub(super) layout: &'a Layout,
-    pub(super) tile: usize,
-    pub(super) from: &'a Amplitudes<V>,
-    pub(super) out: Part<'a, V>,
-}
-
-impl<V: Vector> Kernel for Spectrum<'_, V> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(mut self) {
-        transformed_tile(self.layout, self.from, self.tile, &mut self.out);
-    }
-}
-
-/// Takes a mixer off the adjoint's tile and the state's (transformed already). Returns Im⟨λ|ΣX|ψ⟩.
+/// Takes a mixer off the state and its adjoint. Returns Im⟨λ|ΣX|ψ⟩ of a group of columns.
 pub(super) struct Unmix<'a, V> {
     pub(super) layout: &'a Layout,
     /// With the sign of β changed.
     pub(super) mixer: &'a Mixer,
-    pub(super) tile: usize,
-    pub(super) from: &'a Amplitudes<V>,
-    pub(super) adjoint: Part<'a, V>,
-    pub(super) state: Part<'a, V>,
+    pub(super) state: Columns<'a, V>,
+    pub(super) adjoint: Columns<'a, V>,
 }
 
 impl<V: Vector> Kernel for Unmix<'_, V> {
@@ -205,47 +181,73 @@ impl<V: Vector> Kernel for Unmix<'_, V> {
 
     #[inline(always)]
     fn run(self) -> f64 {
-        let Self { layout, mixer, tile, from, mut adjoint, mut state } = self;
-        let factors = mixer.columns::<V>(layout, tile);
-        transformed_tile(layout, from, tile, &mut adjoint);
-        let (width, qubits) = (layout.width, layout.qubits());
+        let Self { layout, mixer, mut state, mut adjoint } = self;
+        let mut buffers = vec![V::ZERO; 4 * layout.tile()];
+        let (first, second) = buffers.split_at_mut(2 * layout.tile());
+        let (re, im) = first.split_at_mut(layout.tile());
+        let psi = &mut Part { re, im };
+        let (re, im) = second.split_at_mut(layout.tile());
+        let lambda = &mut Part { re, im };
         let mut total = 0.0;
-        for vector in 0..width {
-            let start = (tile * width + vector) * V::LANES;
-            let among_low = V::from_fn(|lane| f64::from((start + lane).count_ones()));
-            let mut sum = V::ZERO;
-            for row in 0..layout.rows() {
-                let at = row * width + vector;
-                let (x, y) = (state.re[at], state.im[at]);
-                let (u, v) = (adjoint.re[at], adjoint.im[at]);
-                let ones = V::splat(f64::from(row.count_ones())) + among_low;
-                sum += (V::splat(qubits as f64) - ones - ones) * (u * y - v * x);
-            }
-            total += sum.sum();
+        for column in (0..state.width()).step_by(layout.width) {
+            let factors = mixer.columns::<V>(layout, state.start + column);
+            state.read(column, layout.width, psi);
+            adjoint.read(column, layout.width, lambda);
+            transform_tile(layout, psi);
+            transform_tile(layout, lambda);
+            total += flips(layout, state.start + column, psi, lambda);
+            scale_tile(&factors, layout, psi);
+            scale_tile(&factors, layout, lambda);
+            transform_tile(layout, psi);
+            transform_tile(layout, lambda);
+            state.write(column, layout.width, psi);
+            adjoint.write(column, layout.width, lambda);
         }
-        for part in [&mut adjoint, &mut state] {
-            scale_tile(&factors, layout, part);
-            walsh::columns(part.re, width);
-            walsh::columns(part.im, width);
-        }
-        total * 0.5_f64.powi(qubits as i32)
+        total * 0.5_f64.powi(layout.qubits() as i32)
     }
 }
 
+/// Im⟨λ|ΣX|ψ⟩ of one transformed tile, where ΣX has the eigenvalue n − 2·(number of ones).
 #[inline(always)]
-fn plain_row<V: Vector>(layout: &Layout, from: &Amplitudes<V>, row: usize, out: &mut Part<'_, V>) {
-    layout.gather_row(&from.re, row, out.re);
-    layout.gather_row(&from.im, row, out.im);
-    walsh::backward(out.re);
-    walsh::backward(out.im);
+fn flips<V: Vector>(
+    layout: &Layout,
+    column: usize,
+    psi: &Part<'_, V>,
+    lambda: &Part<'_, V>,
+) -> f64 {
+    let mut total = 0.0;
+    for vector in 0..layout.width {
+        let start = (column + vector) * V::LANES;
+        let of_low = V::from_fn(|lane| {
+            layout.qubits() as f64 - 2.0 * f64::from((start + lane).count_ones())
+        });
+        let mut sum = V::ZERO;
+        for row in 0..layout.rows() {
+            let at = row * layout.width + vector;
+            let (x, y, u, v) = (psi.re[at], psi.im[at], lambda.re[at], lambda.im[at]);
+            let eigenvalue = of_low - V::splat(2.0 * f64::from(row.count_ones()));
+            sum += eigenvalue * (u * y - v * x);
+        }
+        total += sum.sum();
+    }
+    total
 }
 
-/// The amplitudes of a row, out of the mixer's transform.
+#[inline(always)]
+fn forward<V: Vector>(part: &mut Part<'_, V>) {
+    walsh::forward(part.re);
+    walsh::forward(part.im);
+}
+
+#[inline(always)]
+fn backward<V: Vector>(part: &mut Part<'_, V>) {
+    walsh::backward(part.re);
+    walsh::backward(part.im);
+}
+
+/// A row out of the mixer's transform: plain amplitudes.
 pub(super) struct Plain<'a, V> {
-    pub(super) layout: &'a Layout,
-    pub(super) row: usize,
-    pub(super) from: &'a Amplitudes<V>,
-    pub(super) out: Part<'a, V>,
+    pub(super) state: Part<'a, V>,
 }
 
 impl<V: Vector> Kernel for Plain<'_, V> {
@@ -253,7 +255,7 @@ impl<V: Vector> Kernel for Plain<'_, V> {
 
     #[inline(always)]
     fn run(mut self) {
-        plain_row(self.layout, self.from, self.row, &mut self.out);
+        backward(&mut self.state);
     }
 }
 
@@ -263,8 +265,7 @@ pub(super) struct Phase<'a, V> {
     pub(super) layout: &'a Layout,
     pub(super) phases: &'a Phases<V>,
     pub(super) row: usize,
-    pub(super) from: &'a Amplitudes<V>,
-    pub(super) out: Part<'a, V>,
+    pub(super) state: Part<'a, V>,
 }
 
 impl<V: Vector> Kernel for Phase<'_, V> {
@@ -272,13 +273,12 @@ impl<V: Vector> Kernel for Phase<'_, V> {
 
     #[inline(always)]
     fn run(self) {
-        let Self { energies, layout, phases, row, from, mut out } = self;
-        plain_row(layout, from, row, &mut out);
+        let Self { energies, layout, phases, row, mut state } = self;
+        backward(&mut state);
         let (mut re, mut im) = (vec![V::ZERO; layout.row], vec![V::ZERO; layout.row]);
         phases.row(&energies.row(row), (&mut re, &mut im));
-        phases.apply((&re, &im), &mut out);
-        walsh::forward(out.re);
-        walsh::forward(out.im);
+        phases.apply((&re, &im), &mut state);
+        forward(&mut state);
     }
 }
 
@@ -310,9 +310,7 @@ impl<V: Vector> Kernel for Energy<'_, V> {
 pub(super) struct Turn<'a, V> {
     pub(super) energies: &'a Energies,
     pub(super) low_energies: &'a [V],
-    pub(super) layout: &'a Layout,
     pub(super) row: usize,
-    pub(super) from: &'a Amplitudes<V>,
     pub(super) state: Part<'a, V>,
     pub(super) adjoint: Part<'a, V>,
 }
@@ -322,8 +320,8 @@ impl<V: Vector> Kernel for Turn<'_, V> {
 
     #[inline(always)]
     fn run(self) -> f64 {
-        let Self { energies, low_energies, layout, row, from, mut state, adjoint } = self;
-        plain_row(layout, from, row, &mut state);
+        let Self { energies, low_energies, row, mut state, mut adjoint } = self;
+        backward(&mut state);
         energies.fill(row, low_energies, adjoint.im);
         let mut sum = V::ZERO;
         let there = adjoint.re.iter_mut().zip(adjoint.im.iter_mut());
@@ -332,15 +330,14 @@ impl<V: Vector> Kernel for Turn<'_, V> {
             (*u, *v) = (energy * *x, energy * *y);
             sum += *x * *u + *y * *v;
         }
-        for block in [state.re, state.im, adjoint.re, adjoint.im] {
-            walsh::forward(block);
-        }
+        forward(&mut state);
+        forward(&mut adjoint);
         sum.sum()
     }
 }
 
-/// Takes a phase off the adjoint's row and the state's (plain already), and transforms both for the
-/// mixer before it, if there is one. Returns Im⟨λ|H|ψ⟩.
+/// Takes a phase off a row of the state and its adjoint, and transforms both for the mixer before it, if
+/// there is one. Returns Im⟨λ|H|ψ⟩.
 pub(super) struct Unphase<'a, V> {
     pub(super) energies: &'a Energies,
     pub(super) low_energies: &'a [V],
@@ -348,9 +345,8 @@ pub(super) struct Unphase<'a, V> {
     /// With the sign of γ changed; none before the first layer.
     pub(super) phases: Option<&'a Phases<V>>,
     pub(super) row: usize,
-    pub(super) from: &'a Amplitudes<V>,
-    pub(super) adjoint: Part<'a, V>,
     pub(super) state: Part<'a, V>,
+    pub(super) adjoint: Part<'a, V>,
 }
 
 impl<V: Vector> Kernel for Unphase<'_, V> {
@@ -358,9 +354,9 @@ impl<V: Vector> Kernel for Unphase<'_, V> {
 
     #[inline(always)]
     fn run(self) -> f64 {
-        let Self { energies, low_energies, layout, phases, row, from, mut adjoint, mut state } =
-            self;
-        plain_row(layout, from, row, &mut adjoint);
+        let Self { energies, low_energies, layout, phases, row, mut state, mut adjoint } = self;
+        backward(&mut state);
+        backward(&mut adjoint);
         let (mut re, mut im) = (vec![V::ZERO; layout.row], vec![V::ZERO; layout.row]);
         energies.fill(row, low_energies, &mut re);
         let mut sum = V::ZERO;
@@ -372,8 +368,7 @@ impl<V: Vector> Kernel for Unphase<'_, V> {
             phases.row(&energies.row(row), (&mut re, &mut im));
             for part in [&mut state, &mut adjoint] {
                 phases.apply((&re, &im), part);
-                walsh::forward(part.re);
-                walsh::forward(part.im);
+                forward(part);
             }
         }
         sum.sum()

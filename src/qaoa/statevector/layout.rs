@@ -1,10 +1,15 @@
-//! Where amplitudes lie. A pass over the state reads it in one layout and writes it in the other, so that
-//! what it transforms is contiguous in cache: *rows* of all low qubits for the phases, *tiles* of all
-//! high qubits (a few columns wide) for the other half of the mixer.
+//! Where amplitudes lie, and how a pass over the state cuts them up so that what it transforms fits into
+//! cache: into *rows* (all low qubits, contiguous) for the phases, and into *tiles* (all high qubits, a
+//! few columns wide, copied out and back) for the other half of the mixer.
 
 use rayon::prelude::*;
 
 use super::vector::Vector;
+
+/// Groups of tiles that threads can take separately.
+const GROUPS: usize = 16;
+/// Vectors of a tile's row.
+const WIDTH: usize = 4;
 
 /// Sizes of rows and tiles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,8 +29,7 @@ impl Layout {
     pub(super) fn new<V: Vector>(qubits: usize) -> Self {
         let lanes = V::LANES.trailing_zeros() as usize;
         let low = (qubits / 2).clamp(11, 13);
-        let high = qubits.saturating_sub(low);
-        Self { low, high, row: 1 << (low - lanes), width: 4 }
+        Self { low, high: qubits.saturating_sub(low), row: 1 << (low - lanes), width: WIDTH }
     }
 
     /// All qubits, dummies included.
@@ -42,37 +46,27 @@ impl Layout {
     pub(super) fn tile(&self) -> usize {
         self.width << self.high
     }
-
-    /// Copies one row out of tiles.
-    #[inline(always)]
-    pub(super) fn gather_row<V: Vector>(&self, tiles: &[V], row: usize, out: &mut [V]) {
-        let start = row * self.width;
-        for (tile, out) in out.chunks_exact_mut(self.width).enumerate() {
-            out.copy_from_slice(&tiles[start + tile * self.tile()..][..self.width]);
-        }
-    }
-
-    /// Copies one tile out of rows.
-    #[inline(always)]
-    pub(super) fn gather_tile<V: Vector>(&self, rows: &[V], tile: usize, out: &mut [V]) {
-        let start = tile * self.width;
-        for (row, out) in out.chunks_exact_mut(self.width).enumerate() {
-            out.copy_from_slice(&rows[start + row * self.row..][..self.width]);
-        }
-    }
 }
 
-/// Real and imaginary parts of all amplitudes.
+/// Real and imaginary parts of all amplitudes, row by row.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Amplitudes<V> {
     pub(super) re: Vec<V>,
     pub(super) im: Vec<V>,
 }
 
-/// The same of one row or tile.
+/// Real and imaginary parts of one row or tile.
 pub(super) struct Part<'a, V> {
     pub(super) re: &'a mut [V],
     pub(super) im: &'a mut [V],
+}
+
+/// The same columns of all rows, a few tiles wide.
+pub(super) struct Columns<'a, V> {
+    /// Where the columns start, in vectors.
+    pub(super) start: usize,
+    re: Vec<&'a mut [V]>,
+    im: Vec<&'a mut [V]>,
 }
 
 impl<V: Vector> Amplitudes<V> {
@@ -82,12 +76,66 @@ impl<V: Vector> Amplitudes<V> {
         self.im.resize(layout.row << layout.high, V::ZERO);
     }
 
-    /// Rows or tiles of `size` vectors each, for several threads.
-    pub(super) fn parts(
+    /// All rows, for several threads.
+    pub(super) fn rows(
         &mut self,
-        size: usize,
+        layout: &Layout,
     ) -> impl IndexedParallelIterator<Item = Part<'_, V>> {
-        let parts = self.re.par_chunks_mut(size).zip(self.im.par_chunks_mut(size));
+        let parts = self.re.par_chunks_mut(layout.row).zip(self.im.par_chunks_mut(layout.row));
         parts.map(|(re, im)| Part { re, im })
+    }
+
+    /// All columns in groups, for several threads.
+    pub(super) fn columns(&mut self, layout: &Layout) -> Vec<Columns<'_, V>> {
+        let width = (layout.row / GROUPS).max(layout.width);
+        let group = |group: usize| Columns { start: group * width, re: vec![], im: vec![] };
+        let mut groups: Vec<_> = (0..layout.row / width).map(group).collect();
+        let rows = self.re.chunks_exact_mut(layout.row).zip(self.im.chunks_exact_mut(layout.row));
+        for (re, im) in rows {
+            let pieces = re.chunks_exact_mut(width).zip(im.chunks_exact_mut(width));
+            for (group, (re, im)) in groups.iter_mut().zip(pieces) {
+                group.re.push(re);
+                group.im.push(im);
+            }
+        }
+        groups
+    }
+}
+
+impl<V: Vector> Columns<'_, V> {
+    /// Width of the columns, in vectors.
+    #[inline(always)]
+    pub(super) fn width(&self) -> usize {
+        self.re[0].len()
+    }
+
+    /// Copies out the tile that begins at a column.
+    #[inline(always)]
+    pub(super) fn read(&self, column: usize, width: usize, tile: &mut Part<'_, V>) {
+        for (out, row) in tile.re.chunks_exact_mut(width).zip(&self.re) {
+            copy(&row[column..column + width], out);
+        }
+        for (out, row) in tile.im.chunks_exact_mut(width).zip(&self.im) {
+            copy(&row[column..column + width], out);
+        }
+    }
+
+    /// Copies a tile back.
+    #[inline(always)]
+    pub(super) fn write(&mut self, column: usize, width: usize, tile: &Part<'_, V>) {
+        for (from, row) in tile.re.chunks_exact(width).zip(&mut self.re) {
+            copy(from, &mut row[column..column + width]);
+        }
+        for (from, row) in tile.im.chunks_exact(width).zip(&mut self.im) {
+            copy(from, &mut row[column..column + width]);
+        }
+    }
+}
+
+/// A few vectors; `copy_from_slice` would call a function for them.
+#[inline(always)]
+fn copy<V: Vector>(from: &[V], to: &mut [V]) {
+    for (from, to) in from.iter().zip(to) {
+        *to = *from;
     }
 }

@@ -1,10 +1,10 @@
 //! The engine for any 2-local Ising problem: all 2ⁿ amplitudes.
 //!
-//! A layer is two passes over memory, each on parts that fit into cache (`layout`): the Walsh–Hadamard
-//! transform of one half of the qubits, the diagonal factor that meets there (the phase of the energies
-//! for plain amplitudes, the mixer's eigenvalues for transformed ones), and the transform back (`walsh`,
-//! `energies`, `kernels`). `evolution` strings the passes together, on all threads of the current rayon
-//! pool; results do not depend on their number.
+//! A layer is two passes over memory, in place and on parts that fit into cache (`layout`): the
+//! Walsh–Hadamard transform of one half of the qubits, the diagonal factor that meets there (the phase of
+//! the energies for plain amplitudes, the mixer's eigenvalues for transformed ones), and the transform
+//! back (`walsh`, `energies`, `kernels`). `evolution` strings the passes together, on all threads of the
+//! current rayon pool; results do not depend on their number.
 
 mod energies;
 mod evolution;
@@ -22,9 +22,11 @@ use super::angles::Angles;
 use super::bits::Bits;
 use super::engine::{Engine, EngineError, EngineKind, Sample};
 use super::ising::Ising;
-use super::simd::F4;
 use evolution::Evolution;
-use vector::S8;
+use vector::{D8, S8};
+
+/// Rows and tiles in work on all threads.
+const WORKSPACE_BYTES: u64 = 16 << 20;
 
 /// The numbers that amplitudes are made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -38,7 +40,7 @@ pub enum Precision {
 
 #[derive(Debug, Clone)]
 enum State {
-    Double(Evolution<F4>),
+    Double(Evolution<D8>),
     Single(Evolution<S8>),
 }
 
@@ -78,14 +80,14 @@ impl StatevectorEngine {
         Ok(Self { qubits, state, held: None })
     }
 
-    /// Bytes needed for `qubits`: the state, its adjoint, and one more to write the next layer to.
+    /// Bytes needed for `qubits`: the state and its adjoint, and a little for rows and tiles.
     #[must_use]
     pub fn memory(qubits: usize, precision: Precision) -> u64 {
         let (amplitudes, bytes) = match precision {
-            Precision::Double => (Evolution::<F4>::amplitudes(qubits), 16),
+            Precision::Double => (Evolution::<D8>::amplitudes(qubits), 16),
             Precision::Single => (Evolution::<S8>::amplitudes(qubits), 8),
         };
-        amplitudes.saturating_mul(3 * bytes)
+        amplitudes.saturating_mul(2 * bytes).saturating_add(WORKSPACE_BYTES)
     }
 
     fn hold(&mut self, angles: &Angles) {
@@ -109,7 +111,7 @@ impl StatevectorEngine {
     /// Number of basis states, dummy qubits included.
     fn basis_states(&self) -> usize {
         let amplitudes = match self.state {
-            State::Double(_) => Evolution::<F4>::amplitudes(self.qubits),
+            State::Double(_) => Evolution::<D8>::amplitudes(self.qubits),
             State::Single(_) => Evolution::<S8>::amplitudes(self.qubits),
         };
         amplitudes as usize

@@ -1,11 +1,9 @@
-//! [`Vector`]: the numbers of one vector register, in double or single precision, so that every kernel
-//! is written once.
+//! [`Vector`]: eight numbers next to each other, in double or single precision, so that every kernel is
+//! written once.
 
 use std::ops::{Add, AddAssign, Mul, Sub};
 
-use super::super::simd::F4;
-
-/// A few numbers next to each other.
+/// Eight numbers.
 pub(super) trait Vector:
     Copy
     + Default
@@ -18,8 +16,8 @@ pub(super) trait Vector:
     + AddAssign
     + 'static
 {
-    /// How many; a power of two.
-    const LANES: usize;
+    /// How many.
+    const LANES: usize = 8;
     /// All zero.
     const ZERO: Self;
 
@@ -31,49 +29,91 @@ pub(super) trait Vector:
     fn lane(self, lane: usize) -> f64;
     /// The sum over all lanes.
     fn sum(self) -> f64;
-    /// `LANES` vectors as a square: rows become columns.
-    fn transpose(rows: &mut [Self]);
+    /// This vector's even numbers and the other's, then the odd ones of both, in pairs: the first step
+    /// of exchanging rows and columns.
+    fn by_ones(self, other: Self) -> (Self, Self);
+    /// The same for pairs of numbers.
+    fn by_twos(self, other: Self) -> (Self, Self);
+    /// The same for halves.
+    fn by_fours(self, other: Self) -> (Self, Self);
 }
 
-impl Vector for F4 {
-    const LANES: usize = 4;
-    const ZERO: Self = F4::ZERO;
+macro_rules! eight_lanes {
+    ($name:ident, $scalar:ty, $align:literal, $doc:literal) => {
+        #[doc = $doc]
+        #[derive(Debug, Clone, Copy, PartialEq, Default)]
+        #[repr(align($align))]
+        pub(super) struct $name([$scalar; 8]);
 
-    #[inline(always)]
-    fn splat(value: f64) -> Self {
-        Self([value; 4])
-    }
+        eight_lanes!(operator $name, Add, add, +);
+        eight_lanes!(operator $name, Sub, sub, -);
+        eight_lanes!(operator $name, Mul, mul, *);
 
-    #[inline(always)]
-    fn from_fn(mut value: impl FnMut(usize) -> f64) -> Self {
-        Self([value(0), value(1), value(2), value(3)])
-    }
+        impl AddAssign for $name {
+            #[inline(always)]
+            fn add_assign(&mut self, other: Self) {
+                *self = *self + other;
+            }
+        }
 
-    #[inline(always)]
-    fn lane(self, lane: usize) -> f64 {
-        self.0[lane]
-    }
+        impl Vector for $name {
+            const ZERO: Self = Self([0.0; 8]);
 
-    #[inline(always)]
-    fn sum(self) -> f64 {
-        F4::sum(self)
-    }
+            #[inline(always)]
+            fn splat(value: f64) -> Self {
+                Self([value as $scalar; 8])
+            }
 
-    #[inline(always)]
-    fn transpose(rows: &mut [Self]) {
-        let square = F4::transpose([rows[0], rows[1], rows[2], rows[3]]);
-        rows.copy_from_slice(&square);
-    }
-}
+            #[inline(always)]
+            fn from_fn(mut value: impl FnMut(usize) -> f64) -> Self {
+                let mut lanes = [0.0; 8];
+                for (lane, out) in lanes.iter_mut().enumerate() {
+                    *out = value(lane) as $scalar;
+                }
+                Self(lanes)
+            }
 
-/// Eight numbers in single precision.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-#[repr(align(32))]
-pub(super) struct S8([f32; 8]);
+            #[inline(always)]
+            fn lane(self, lane: usize) -> f64 {
+                f64::from(self.0[lane])
+            }
 
-macro_rules! lane_by_lane {
-    ($trait:ident, $method:ident, $operator:tt) => {
-        impl $trait for S8 {
+            #[inline(always)]
+            fn sum(self) -> f64 {
+                let Self([a, b, c, d, e, f, g, h]) = self;
+                f64::from((a + b) + (c + d)) + f64::from((e + f) + (g + h))
+            }
+
+            #[inline(always)]
+            fn by_ones(self, other: Self) -> (Self, Self) {
+                let (a, b) = (self.0, other.0);
+                (
+                    Self([a[0], b[0], a[2], b[2], a[4], b[4], a[6], b[6]]),
+                    Self([a[1], b[1], a[3], b[3], a[5], b[5], a[7], b[7]]),
+                )
+            }
+
+            #[inline(always)]
+            fn by_twos(self, other: Self) -> (Self, Self) {
+                let (a, b) = (self.0, other.0);
+                (
+                    Self([a[0], a[1], b[0], b[1], a[4], a[5], b[4], b[5]]),
+                    Self([a[2], a[3], b[2], b[3], a[6], a[7], b[6], b[7]]),
+                )
+            }
+
+            #[inline(always)]
+            fn by_fours(self, other: Self) -> (Self, Self) {
+                let (a, b) = (self.0, other.0);
+                (
+                    Self([a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3]]),
+                    Self([a[4], a[5], a[6], a[7], b[4], b[5], b[6], b[7]]),
+                )
+            }
+        }
+    };
+    (operator $name:ident, $trait:ident, $method:ident, $operator:tt) => {
+        impl $trait for $name {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
@@ -87,86 +127,5 @@ macro_rules! lane_by_lane {
     };
 }
 
-lane_by_lane!(Add, add, +);
-lane_by_lane!(Sub, sub, -);
-lane_by_lane!(Mul, mul, *);
-
-impl AddAssign for S8 {
-    #[inline(always)]
-    fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
-    }
-}
-
-impl Vector for S8 {
-    const LANES: usize = 8;
-    const ZERO: Self = Self([0.0; 8]);
-
-    #[inline(always)]
-    fn splat(value: f64) -> Self {
-        Self([value as f32; 8])
-    }
-
-    #[inline(always)]
-    fn from_fn(mut value: impl FnMut(usize) -> f64) -> Self {
-        let mut lanes = [0.0; 8];
-        for (lane, out) in lanes.iter_mut().enumerate() {
-            *out = value(lane) as f32;
-        }
-        Self(lanes)
-    }
-
-    #[inline(always)]
-    fn lane(self, lane: usize) -> f64 {
-        f64::from(self.0[lane])
-    }
-
-    #[inline(always)]
-    fn sum(self) -> f64 {
-        let Self([a, b, c, d, e, f, g, h]) = self;
-        f64::from((a + b) + (c + d)) + f64::from((e + f) + (g + h))
-    }
-
-    #[inline(always)]
-    fn transpose(rows: &mut [Self]) {
-        // Two by two, four by four, eight by eight: exchange the off-diagonal parts.
-        for (half, mask) in [(1, 0b0101_0101), (2, 0b0011_0011), (4, 0b0000_1111)] {
-            for row in 0..8 {
-                if row & half == 0 {
-                    let (Self(a), Self(b)) = (rows[row], rows[row + half]);
-                    let (mut upper, mut lower) = (a, b);
-                    for lane in 0..8 {
-                        if mask >> lane & 1 == 0 {
-                            upper[lane] = b[lane - half];
-                        } else {
-                            lower[lane] = a[lane + half];
-                        }
-                    }
-                    (rows[row], rows[row + half]) = (Self(upper), Self(lower));
-                }
-            }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn transposes<V: Vector>() {
-        let entry = |row: usize, column: usize| (10 * row + column) as f64;
-        let mut rows: Vec<V> = (0..V::LANES).map(|r| V::from_fn(|c| entry(r, c))).collect();
-        V::transpose(&mut rows);
-        for (row, vector) in rows.iter().enumerate() {
-            for column in 0..V::LANES {
-                assert_eq!(vector.lane(column), entry(column, row));
-            }
-        }
-    }
-
-    #[test]
-    fn rows_become_columns_in_both_precisions() {
-        transposes::<F4>();
-        transposes::<S8>();
-    }
-}
+eight_lanes!(D8, f64, 64, "Eight numbers in double precision.");
+eight_lanes!(S8, f32, 32, "Eight numbers in single precision.");
