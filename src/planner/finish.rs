@@ -46,8 +46,9 @@ pub fn with_few_corners(path: &[Xy], space: &LegSpace<'_>, share: f64) -> Vec<Xy
             path.remove(k + 1);
             prices.remove(k + 1);
             allowance -= extra;
-            for near in k.saturating_sub(2)..(k + 3).min(path.len()) {
-                prices[near] = price(&path, near);
+            let (first, end) = (k.saturating_sub(2), (k + 3).min(path.len()));
+            for (near, entry) in (first..end).zip(&mut prices[first..end]) {
+                *entry = price(&path, near);
             }
         } else {
             prices[k] = None;

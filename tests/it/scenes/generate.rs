@@ -371,7 +371,7 @@ pub(crate) fn inclusions(seed: u64) -> Scene {
         }
     }
     // Ends as far out as there is room.
-    let mut end = |angle: f64| {
+    let end = |angle: f64| {
         let direction = rotated([1.0, 0.0], angle);
         let open =
             (0..400).rev().map(|k| mul(direction, f64::from(k))).find(|&p| is_open(&regions, p));
