@@ -16,9 +16,17 @@ use super::polyline::{distance, length, turning};
 use super::search::{CornerPath, CornerSearch};
 use super::settings::Settings;
 use crate::geodesy::Xy;
+use crate::units::Metres;
 
 /// How near a barrier is to a ray that meets it, metres.
 const ON_THE_RAY: f64 = 1e-6;
+
+/// So many times the wanted grid paths are looked at: eight directions tell little of which will
+/// be the shortest once it is taut.
+const GRID_CHOICE: usize = 4;
+
+/// How many times a grid without a clear path is made finer.
+const GRID_HALVINGS: u32 = 3;
 
 /// A way that is longer than this many times the shortest cannot win.
 const WORTH_A_TRY: f64 = 1.5;
@@ -48,12 +56,15 @@ pub struct Candidate {
     pub turning: f64,
     /// Whether every edge keeps the planning margin.
     pub clear: bool,
+    /// The resolution of the grid that it was found on, where it was.
+    pub resolution: Option<Metres>,
 }
 
 impl Candidate {
     fn new(points: Vec<Xy>, source: Source, space: &LegSpace<'_>) -> Self {
         let clear = points.windows(2).all(|edge| space.is_clear(edge[0], edge[1]));
-        Self { length: length(&points), turning: turning(&points), points, source, clear }
+        let (length, turning) = (length(&points), turning(&points));
+        Self { length, turning, points, source, clear, resolution: None }
     }
 }
 
@@ -81,23 +92,51 @@ pub fn candidates(
     }
     if settings.source.uses_grid() || found.is_empty() {
         let more = wanted.saturating_sub(found.len()).max(1);
-        let grid = GridSearch::new(space, start, goal, settings.grid, cancelled);
-        for points in grid.paths(more) {
-            found.push(Candidate::new(points, Source::Grid, space));
-        }
+        found.extend(grid_candidates(space, start, goal, settings, more, cancelled));
     }
     found.sort_by(|a, b| b.clear.cmp(&a.clear).then(a.length.total_cmp(&b.length)));
     found.push(Candidate::new(vec![start, goal], Source::Straight, space));
     found
 }
 
-/// A path with as few corners as its length allows, and with no more than there are qubits where
-/// that costs little.
+/// Different paths over the grid, pulled taut where the next point but one is in sight. Where the
+/// grid is too coarse to have a clear path, it is halved.
+fn grid_candidates(
+    space: &LegSpace<'_>,
+    start: Xy,
+    goal: Xy,
+    settings: &Settings,
+    wanted: usize,
+    cancelled: &AtomicBool,
+) -> Vec<Candidate> {
+    for halvings in 0..=GRID_HALVINGS {
+        let resolution = settings.grid.0 / f64::from(1u32 << halvings);
+        let grid = GridSearch::new(space, start, goal, Metres(resolution), cancelled);
+        let mut found: Vec<Candidate> = grid
+            .paths(GRID_CHOICE * wanted)
+            .into_iter()
+            .map(|path| {
+                let path = with_corners_that_fit(&path, space, settings.qubits);
+                let candidate = Candidate::new(path, Source::Grid, space);
+                Candidate { resolution: Some(grid.resolution()), ..candidate }
+            })
+            .collect();
+        found.sort_by(|a, b| b.clear.cmp(&a.clear).then(a.length.total_cmp(&b.length)));
+        found.truncate(wanted);
+        if found.iter().any(|candidate| candidate.clear) || grid.resolution().0 > resolution {
+            return found;
+        }
+    }
+    Vec::new()
+}
+
+/// A path with as few corners as its length allows, and where that costs little with few enough to
+/// leave some qubits to the refinement.
 fn with_corners_that_fit(path: &[Xy], space: &LegSpace<'_>, qubits: usize) -> Vec<Xy> {
     [1.0, 2.0, 4.0]
         .into_iter()
         .map(|factor| with_few_corners(path, space, factor * WORTH_OF_FEW))
-        .find(|path| path.len() <= qubits + 1)
+        .find(|path| 4 * path.len() <= 3 * qubits + 4)
         .unwrap_or_else(|| with_few_corners(path, space, WORTH_OF_FEW))
 }
 

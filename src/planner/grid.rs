@@ -8,6 +8,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::homotopy::passes_differently;
 use super::leg_space::LegSpace;
 use super::polyline::{distance, simplified};
 use crate::geodesy::Xy;
@@ -17,7 +18,7 @@ use crate::units::Metres;
 const MAX_POINTS: usize = 1 << 21;
 
 /// How much dearer a step becomes near a path that was already taken.
-const TAKEN: f64 = 0.35;
+const TAKEN: f64 = 0.1;
 
 /// Eight neighbours: column and row offsets.
 const NEIGHBOURS: [(i64, i64); 8] =
@@ -66,14 +67,20 @@ impl<'a> GridSearch<'a> {
         Self { space: *space, origin, along, resolution, columns, rows, start, goal, cancelled }
     }
 
-    /// Up to `wanted` different paths, the shortest first.
+    /// The resolution: the one asked for, or a coarser one where that would be too many points.
+    #[must_use]
+    pub fn resolution(&self) -> Metres {
+        Metres(self.resolution)
+    }
+
+    /// Up to `wanted` paths that pass obstacles on different sides, the shortest first.
     #[must_use]
     pub fn paths(&self, wanted: usize) -> Vec<Vec<Xy>> {
         let mut free: Vec<Option<bool>> = vec![None; self.columns * self.rows];
         let mut price = vec![1.0f64; free.len()];
         let mut found: Vec<Vec<Xy>> = Vec::new();
         // A dearer neighbourhood may lead back to the same path: try a few times more.
-        for _ in 0..2 * wanted {
+        for _ in 0..3 * wanted {
             if found.len() >= wanted || self.cancelled.load(Ordering::Relaxed) {
                 break;
             }
@@ -87,7 +94,7 @@ impl<'a> GridSearch<'a> {
                 .collect();
             points.dedup();
             let points = simplified(&points, 1e-6, |_, _| true);
-            if !found.contains(&points) {
+            if found.iter().all(|known| passes_differently(known, &points, &self.space)) {
                 found.push(points);
             }
         }

@@ -9,11 +9,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::candidates::Candidate;
+use super::candidates::{Candidate, Source};
+use super::homotopy::passes_differently;
 use super::moves::moves;
 use super::polyline::{length, simplified};
 use super::settings::{Rounds, Settings};
-use super::stations::stations;
+use super::stations::aligned;
 use super::trellis::{EdgeJudge, Trellis};
 use crate::geodesy::Xy;
 use crate::qaoa::{
@@ -78,11 +79,25 @@ pub enum RoundError {
     Cancelled,
 }
 
-/// Refinement rounds at least, rounds without progress before the end, and rounds at most, where
-/// the number of rounds is left to the planner.
-const LEAST_REFINEMENTS: u32 = 6;
-const IDLE_REFINEMENTS: u32 = 4;
-const MOST_REFINEMENTS: u32 = 60;
+/// Refinement rounds at least, and rounds without progress before the end, where the number of
+/// rounds is left to the planner.
+const LEAST_REFINEMENTS: usize = 6;
+const IDLE_REFINEMENTS: usize = 4;
+
+/// Rounds at most, where their number is left to the planner.
+const MOST_ROUNDS: usize = 60;
+
+/// Refinement rounds for a rough candidate to show what it is worth.
+const TRIAL: usize = 12;
+
+/// A rough candidate this many times as long as the incumbent has a chance.
+const RIVAL: f64 = 1.06;
+
+/// Steps shrink over so many refinement rounds.
+const STEPS_SHRINK_OVER: usize = 24;
+
+/// How often moves are drawn until one moves something.
+const PROPOSALS: usize = 8;
 
 /// An improvement that counts as progress, as a share of the path's length.
 const PROGRESS: f64 = 5e-5;
@@ -91,7 +106,7 @@ const PROGRESS: f64 = 5e-5;
 const STRAIGHT: f64 = 1e-3;
 
 /// Steps of a training that starts from the angles of an earlier round.
-const CARRIED_STEPS: usize = 8;
+const CARRIED_STEPS: usize = 16;
 
 /// The incumbent with all that the rounds share.
 pub struct Contest<'a> {
@@ -100,8 +115,11 @@ pub struct Contest<'a> {
     qaoa: &'a mut Qaoa,
     rng: ChaCha8Rng,
     incumbent: Vec<Xy>,
-    angles: Option<Angles>,
+    /// The last angles of route rounds and of refinements.
+    angles: [Option<Angles>; 2],
     rounds: Vec<Round>,
+    /// Rounds at most.
+    budget: usize,
     cancelled: &'a AtomicBool,
 }
 
@@ -121,8 +139,9 @@ impl<'a> Contest<'a> {
             qaoa,
             rng: ChaCha8Rng::seed_from_u64(settings.seed),
             incumbent: first.points.clone(),
-            angles: None,
+            angles: [None, None],
             rounds: Vec::new(),
+            budget: 0,
             cancelled,
         }
     }
@@ -136,32 +155,86 @@ impl<'a> Contest<'a> {
         others: &[Candidate],
         mut watch: impl FnMut(&Round),
     ) -> Result<(Vec<Xy>, Vec<Round>), RoundError> {
-        let budget = match self.settings.rounds {
-            Rounds::Auto => u32::MAX,
-            Rounds::AtMost(rounds) => rounds,
+        self.budget = match self.settings.rounds {
+            Rounds::Auto => MOST_ROUNDS.max(others.len() + LEAST_REFINEMENTS),
+            Rounds::AtMost(rounds) => rounds as usize,
         };
-        for other in others.iter().take(budget as usize) {
-            let challenger = other.points.clone();
-            self.round(Challenger::Route, self.incumbent.clone(), challenger, &mut watch)?;
+        for other in others {
+            self.challenge(other.points.clone(), &mut watch)?;
         }
-        let spent = self.rounds.len() as u32;
-        let most = MOST_REFINEMENTS.min(budget.saturating_sub(spent));
-        let planned = if self.settings.rounds == Rounds::Auto { 24 } else { most };
+        // Candidates from the grid are rough: the one that is best once it is taut need not be
+        // the one that is best now. Those that pass obstacles on other sides get their chance.
+        let rough = others.iter().filter(|other| other.source == Source::Grid && other.clear);
+        let mut seen = vec![self.incumbent.clone()];
+        if self.settings.rounds == Rounds::Auto {
+            for other in rough {
+                let space = &self.judge.space;
+                let rival = length(&other.points) <= RIVAL * length(&self.incumbent);
+                let new = seen.iter().all(|seen| passes_differently(seen, &other.points, space));
+                if !rival || !new || self.rounds.len() + 2 * TRIAL > self.budget {
+                    continue;
+                }
+                if seen.len() == 1 {
+                    self.refine(TRIAL, &mut watch)?;
+                }
+                seen.push(other.points.clone());
+                let champion = std::mem::replace(&mut self.incumbent, other.points.clone());
+                self.refine(TRIAL, &mut watch)?;
+                self.challenge(champion, &mut watch)?;
+            }
+        }
+        self.refine(usize::MAX, &mut watch)?;
+        Ok((self.incumbent, self.rounds))
+    }
+
+    /// A route round against another polyline; the cheaper of the two is the incumbent.
+    fn challenge(
+        &mut self,
+        other: Vec<Xy>,
+        watch: &mut impl FnMut(&Round),
+    ) -> Result<(), RoundError> {
+        let mut from = std::mem::take(&mut self.incumbent);
+        let mut to = other;
+        if self.cost(&to) < self.cost(&from) {
+            std::mem::swap(&mut from, &mut to);
+        }
+        self.incumbent.clone_from(&from);
+        self.round(Challenger::Route, from, to, watch)
+    }
+
+    /// Refinement rounds until several in a row have brought next to nothing.
+    fn refine(
+        &mut self,
+        at_most: usize,
+        watch: &mut impl FnMut(&Round),
+    ) -> Result<(), RoundError> {
+        let auto = self.settings.rounds == Rounds::Auto;
+        let most = self.budget.saturating_sub(self.rounds.len()).min(at_most);
+        let planned = if auto { STEPS_SHRINK_OVER.min(most) } else { most };
         let mut idle = 0;
         for k in 0..most {
-            let before = length(&self.incumbent);
-            let progress = (f64::from(k) / f64::from(planned.max(1))).min(1.0);
-            let moves =
-                moves(&self.incumbent, &self.judge.space, progress, self.room(), &mut self.rng);
-            self.round(Challenger::Refinement, moves.from, moves.to, &mut watch)?;
-            let gained = before - length(&self.incumbent);
+            let before = self.cost(&self.incumbent);
+            let progress = (k as f64 / planned.max(1) as f64).min(1.0);
+            let moves = (0..PROPOSALS)
+                .map(|_| {
+                    moves(&self.incumbent, &self.judge, progress, self.room(), &mut self.rng)
+                })
+                .find(|moves| moves.from != moves.to);
+            // Nothing can be moved at all, as on a straight line.
+            let Some(moves) = moves else { break };
+            self.round(Challenger::Refinement, moves.from, moves.to, watch)?;
+            let gained = before - self.cost(&self.incumbent);
             idle = if gained > PROGRESS * before { 0 } else { idle + 1 };
-            let settled = k + 1 >= LEAST_REFINEMENTS && idle >= IDLE_REFINEMENTS;
-            if self.settings.rounds == Rounds::Auto && settled {
+            if auto && k + 1 >= LEAST_REFINEMENTS && idle >= IDLE_REFINEMENTS {
                 break;
             }
         }
-        Ok((self.incumbent, self.rounds))
+        Ok(())
+    }
+
+    /// What a path costs, collisions as the paper reports them.
+    fn cost(&self, path: &[Xy]) -> f64 {
+        path.windows(2).map(|edge| self.judge.edge(edge[0], edge[1]).cost()).sum()
     }
 
     /// Corners that an incumbent may have.
@@ -180,14 +253,16 @@ impl<'a> Contest<'a> {
         if self.cancelled.load(Ordering::Relaxed) {
             return Err(RoundError::Cancelled);
         }
-        let edges = self.settings.qubits.max(from.len() - 1).max(to.len() - 1);
-        let (Some(a), Some(b)) = (stations(&from, edges), stations(&to, edges)) else {
+        if self.rounds.len() >= self.budget {
+            return Ok(());
+        }
+        let Some((a, b)) = aligned(&from, &to, self.settings.qubits) else {
             return Ok(()); // a path without length: nothing to contest
         };
         let trellis = Trellis::new(a, b, &self.judge);
         let penalty = trellis.penalty();
         let ising: Ising = trellis.ising(penalty)?.into();
-        let settings = self.run_settings();
+        let settings = self.run_settings(kind);
         let run = self.qaoa.run(&ising, &settings)?;
 
         let zeros = Bits::zeros(trellis.qubits());
@@ -205,7 +280,7 @@ impl<'a> Contest<'a> {
         };
         let space = self.judge.space;
         self.incumbent = simplified(&chosen, STRAIGHT, |a, b| space.is_clear(a, b));
-        self.angles = Some(run.angles.clone());
+        self.angles[kind as usize] = Some(run.angles.clone());
 
         let best_sample = run.best.as_ref().map_or(f64::INFINITY, |best| best.energy);
         let (exact_optimum, gap, p_optimum) = match &run.certificate {
@@ -233,16 +308,16 @@ impl<'a> Contest<'a> {
         Ok(())
     }
 
-    fn run_settings(&mut self) -> RunSettings {
+    fn run_settings(&mut self, kind: Challenger) -> RunSettings {
         let settings = self.settings;
         let full = TrainSettings {
             steps: settings.steps,
             learning_rate: settings.learning_rate,
             settled: None,
         };
-        let (angles, train) = match &self.angles {
+        let (angles, train) = match &self.angles[kind as usize] {
             Some(angles) if !settings.full_training => {
-                let settled = Some(Settled { window: 2, tolerance: 2e-2 });
+                let settled = Some(Settled { window: 3, tolerance: 1e-2 });
                 let steps = settings.steps.min(CARRIED_STEPS);
                 (
                     AnglesSource::CarriedOver(angles.clone()),

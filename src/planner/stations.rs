@@ -4,8 +4,11 @@
 //! stations, each near the place in the sequence that its distance along the path calls for, so
 //! that stations with the same index on two candidates are about as far on the way.
 
-use super::polyline::distance;
+use super::polyline::{distance, length};
 use crate::geodesy::Xy;
+
+/// Vertices of two polylines this near to each other are the same, metres.
+const SAME: f64 = 1e-6;
 
 /// The `edges + 1` stations of a polyline: its vertices, and points between them so that the
 /// edges are of about equal length. `None` where it has more edges than asked for.
@@ -37,6 +40,86 @@ pub fn stations(path: &[Xy], edges: usize) -> Option<Vec<Xy>> {
     }
     result.push(path[segments]);
     Some(result)
+}
+
+/// The stations of two polylines with the same ends, at least `edges` edges each. Where both have
+/// a vertex in common it is the same station of both, and what is between two of these has the
+/// same number of edges, unless this would take more than `edges`. The stations that no vertex needs go to the edges that both have in
+/// common; there the two are alike and nothing has to be decided.
+///
+/// `None` where one of the polylines is no line.
+#[must_use]
+pub fn aligned(one: &[Xy], other: &[Xy], edges: usize) -> Option<(Vec<Xy>, Vec<Xy>)> {
+    if one.len() < 2 || other.len() < 2 {
+        return None;
+    }
+    let common = common_vertices(one, other);
+    let sections: Vec<(&[Xy], &[Xy])> = common
+        .windows(2)
+        .map(|pair| (&one[pair[0].0..=pair[1].0], &other[pair[0].1..=pair[1].1]))
+        .collect();
+    let mut counts: Vec<usize> =
+        sections.iter().map(|(a, b)| a.len().max(b.len()) - 1).collect();
+    let shared = |k: usize| counts_as_shared(sections[k]);
+    if counts.iter().sum::<usize>() > edges && one.len().max(other.len()) <= edges + 1 {
+        return Some((stations(one, edges)?, stations(other, edges)?));
+    }
+    let any_shared = (0..sections.len()).any(shared);
+    for _ in counts.iter().sum()..edges {
+        // The section with the longest edges gets one more.
+        let longest = (0..sections.len())
+            .filter(|&k| !any_shared || shared(k))
+            .max_by(|&j, &k| {
+                let step = |k: usize| length(sections[k].0) / counts[k] as f64;
+                step(j).total_cmp(&step(k))
+            })?;
+        counts[longest] += 1;
+    }
+    let (mut a, mut b) = (vec![one[0]], vec![other[0]]);
+    for (k, (on_one, on_other)) in sections.iter().enumerate() {
+        a.extend(&stations(on_one, counts[k])?[1..]);
+        b.extend(&stations(on_other, counts[k])?[1..]);
+    }
+    Some((a, b))
+}
+
+/// Whether two sections are one and the same edge.
+fn counts_as_shared((a, b): (&[Xy], &[Xy])) -> bool {
+    a.len() == 2 && b.len() == 2
+}
+
+/// The longest sequence of vertices that two polylines have in common, by their places in both;
+/// the first and the last vertices always are.
+fn common_vertices(one: &[Xy], other: &[Xy]) -> Vec<(usize, usize)> {
+    let (n, m) = (one.len(), other.len());
+    let same = |i: usize, j: usize| {
+        (i == 0 && j == 0)
+            || (i == n - 1 && j == m - 1)
+            || (i > 0 && j > 0 && i < n - 1 && j < m - 1 && distance(one[i], other[j]) < SAME)
+    };
+    // lengths[i][j]: of the longest common sequence from i and j on.
+    let mut lengths = vec![vec![0u32; m + 1]; n + 1];
+    for i in (0..n).rev() {
+        for j in (0..m).rev() {
+            lengths[i][j] = if same(i, j) {
+                lengths[i + 1][j + 1] + 1
+            } else {
+                lengths[i + 1][j].max(lengths[i][j + 1])
+            };
+        }
+    }
+    let (mut i, mut j, mut common) = (0, 0, Vec::new());
+    while i < n && j < m {
+        if same(i, j) {
+            common.push((i, j));
+            (i, j) = (i + 1, j + 1);
+        } else if lengths[i + 1][j] >= lengths[i][j + 1] {
+            i += 1;
+        } else {
+            j += 1;
+        }
+    }
+    common
 }
 
 #[cfg(test)]

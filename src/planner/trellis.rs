@@ -189,11 +189,16 @@ impl Trellis {
         // The paper's −10³ on the start segment "ensures that the path always begins at the
         // start"; here both stations of qubit 0 are the start, and the bias only has to choose
         // one of two equal bits. At 10³ m it would drown the other terms once H is divided by σ;
-        // the mean size of the other fields is enough.
-        let mean = h.iter().map(|field| field.abs()).sum::<f64>() / n as f64;
-        let bias = mean.max(f64::EPSILON);
-        h[0] -= bias;
-        constant += bias;
+        // the mean size of the other fields is enough. The same goes for every other station
+        // that the two polylines share.
+        let idle: Vec<usize> =
+            (0..n).filter(|&i| self.incumbent[i] == self.challenger[i]).collect();
+        let size = h.iter().map(|field| field.abs()).sum::<f64>();
+        let bias = (size / (n - idle.len()).max(1) as f64).max(f64::EPSILON);
+        for i in idle {
+            h[i] -= bias;
+            constant += bias;
+        }
         ChainIsing::new(constant, h, j)
     }
 }
