@@ -203,11 +203,7 @@ impl<'a> Contest<'a> {
     }
 
     /// Refinement rounds until several in a row have brought next to nothing.
-    fn refine(
-        &mut self,
-        at_most: usize,
-        watch: &mut impl FnMut(&Round),
-    ) -> Result<(), RoundError> {
+    fn refine(&mut self, at_most: usize, watch: &mut impl FnMut(&Round)) -> Result<(), RoundError> {
         let auto = self.settings.rounds == Rounds::Auto;
         let most = self.budget.saturating_sub(self.rounds.len()).min(at_most);
         let planned = if auto { STEPS_SHRINK_OVER.min(most) } else { most };
@@ -216,9 +212,7 @@ impl<'a> Contest<'a> {
             let before = self.cost(&self.incumbent);
             let progress = (k as f64 / planned.max(1) as f64).min(1.0);
             let moves = (0..PROPOSALS)
-                .map(|_| {
-                    moves(&self.incumbent, &self.judge, progress, self.room(), &mut self.rng)
-                })
+                .map(|_| moves(&self.incumbent, &self.judge, progress, self.room(), &mut self.rng))
                 .find(|moves| moves.from != moves.to);
             // Nothing can be moved at all, as on a straight line.
             let Some(moves) = moves else { break };

@@ -58,8 +58,7 @@ pub fn aligned(one: &[Xy], other: &[Xy], edges: usize) -> Option<(Vec<Xy>, Vec<X
         .windows(2)
         .map(|pair| (&one[pair[0].0..=pair[1].0], &other[pair[0].1..=pair[1].1]))
         .collect();
-    let mut counts: Vec<usize> =
-        sections.iter().map(|(a, b)| a.len().max(b.len()) - 1).collect();
+    let mut counts: Vec<usize> = sections.iter().map(|(a, b)| a.len().max(b.len()) - 1).collect();
     let shared = |k: usize| counts_as_shared(sections[k]);
     if counts.iter().sum::<usize>() > edges && one.len().max(other.len()) <= edges + 1 {
         return Some((stations(one, edges)?, stations(other, edges)?));
@@ -67,9 +66,8 @@ pub fn aligned(one: &[Xy], other: &[Xy], edges: usize) -> Option<(Vec<Xy>, Vec<X
     let any_shared = (0..sections.len()).any(shared);
     for _ in counts.iter().sum()..edges {
         // The section with the longest edges gets one more.
-        let longest = (0..sections.len())
-            .filter(|&k| !any_shared || shared(k))
-            .max_by(|&j, &k| {
+        let longest =
+            (0..sections.len()).filter(|&k| !any_shared || shared(k)).max_by(|&j, &k| {
                 let step = |k: usize| length(sections[k].0) / counts[k] as f64;
                 step(j).total_cmp(&step(k))
             })?;
