@@ -119,11 +119,7 @@ pub fn finished(
     let mut waypoints = Vec::new();
     for edge in path.windows(2) {
         // A long edge is divided only where its deviation would matter.
-        let pieces = if space.flown_blocker(edge[0], edge[1]).is_none() {
-            1
-        } else {
-            (distance(edge[0], edge[1]) / space.longest_edge()).ceil().max(1.0) as u32
-        };
+        let pieces = space.pieces(edge[0], edge[1]);
         for piece in 1..=pieces {
             let share = f64::from(piece) / f64::from(pieces);
             let position = frame.to_position(edge[0] + (edge[1] - edge[0]) * share)?.to_e7();

@@ -15,16 +15,19 @@ pub struct LegSpace<'a> {
     margin: f64,
     /// Metres of deviation per square metre of edge length.
     deviation: f64,
-    /// What planning keeps beyond the margin, metres.
-    reserve: f64,
+    /// The deviation that an edge of a finished path may have, metres; longer ones are divided.
+    edge_deviation: f64,
 }
 
 /// What planning keeps beyond the margin, metres: positions are rounded to 1e-7° (at most 8 mm
 /// off) before the result is judged.
 const ROUNDING: f64 = 0.009;
 
-/// The deviation that an edge of a finished path may have, metres; longer edges are divided.
-pub const MAX_DEVIATION: f64 = 0.01;
+/// The most pieces that an edge is divided into.
+const MOST_PIECES: f64 = 1000.0;
+
+/// The most that an edge of a finished path may deviate, metres.
+const MAX_DEVIATION: f64 = 0.01;
 
 impl<'a> LegSpace<'a> {
     /// A leg's view of an airspace: `margin` in local metres, the leg's northernmost or
@@ -37,14 +40,14 @@ impl<'a> LegSpace<'a> {
         // from the central meridian; 0.15 stands for x/R, far outside any zone.
         let tangent = latitude.abs().min(85.0).to_radians().tan();
         let deviation = (tangent + 0.15) / (8.0 * EARTH_RADIUS);
-        Self { airspace, margin, deviation, reserve: ROUNDING + MAX_DEVIATION }
+        Self { airspace, margin, deviation, edge_deviation: MAX_DEVIATION }
     }
 
     /// The same for planning with edges that are not much longer than `length` metres: they need
     /// not keep more than these deviate.
     #[must_use]
     pub fn with_edges_up_to(mut self, length: f64) -> Self {
-        self.reserve = ROUNDING + self.flown_deviation(length).min(MAX_DEVIATION);
+        self.edge_deviation = self.flown_deviation(length).min(MAX_DEVIATION);
         self
     }
 
@@ -63,7 +66,7 @@ impl<'a> LegSpace<'a> {
     /// The margin that planned paths keep, local metres.
     #[must_use]
     pub fn planning_margin(&self) -> f64 {
-        self.margin + self.reserve
+        self.margin + ROUNDING + self.edge_deviation
     }
 
     /// How far the vehicle may be from the planned line on a straight edge, metres.
@@ -72,10 +75,19 @@ impl<'a> LegSpace<'a> {
         self.deviation * length * length
     }
 
-    /// The edge length at which [`LegSpace::flown_deviation`] reaches [`MAX_DEVIATION`], metres.
+    /// Into how many pieces a planned edge has to be divided so that it is clear when it is flown
+    /// between rounded positions: one, unless it is long and something is near.
     #[must_use]
-    pub fn longest_edge(&self) -> f64 {
-        (MAX_DEVIATION / self.deviation).sqrt()
+    pub fn pieces(&self, a: Xy, b: Xy) -> u32 {
+        let length = (b.x - a.x).hypot(b.y - a.y);
+        let deviation = self.flown_deviation(length);
+        if deviation <= self.edge_deviation
+            || self.airspace.is_clear(a, b, self.margin + ROUNDING + deviation)
+        {
+            return 1;
+        }
+        // The deviation goes with the square of the length.
+        (deviation / self.edge_deviation).sqrt().ceil().clamp(1.0, MOST_PIECES) as u32
     }
 
     /// Whether a planned edge keeps the planning margin.

@@ -87,7 +87,7 @@ fn judged(scene: &Scene, settings: Settings) -> Result<Report, String> {
                 return Err(format!("{name}: comes as near as {kept} m"));
             }
             let found = length(&path);
-            let exact = oracle::shortest(scene, BUFFER, Some(found * 1.001))
+            let exact = oracle::shortest(scene, BUFFER, Some(found * 1.0002))
                 .ok_or_else(|| format!("{name}: the oracle has no path of {found} m"))?;
             report.ratio = Some(found / exact);
             report.waypoints = path.len() - 2;

@@ -514,7 +514,7 @@ pub(crate) fn long_leg(seed: u64) -> Scene {
     let mut rng = rng_of("long-leg", seed);
     let half = 10_000.0;
     let mut regions = Vec::new();
-    for _ in 0..rng.random_range(20..120) {
+    for _ in 0..rng.random_range(10..35) {
         let centre = [rng.random_range(-half..half), rng.random_range(-900.0..900.0)];
         match rng.random_range(0..4) {
             0 => regions.push(disc(centre, rng.random_range(0.5..20.0))),
