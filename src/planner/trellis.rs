@@ -215,7 +215,11 @@ mod tests {
     }
 
     fn trellis(costs: &[[f64; 4]], collisions: &[[bool; 4]]) -> Trellis {
-        let stations = vec![Xy { x: 0., y: 0. }; costs.len() + 1];
+        // Only the ends are shared: the bias of shared stations is no part of the cost.
+        let n = costs.len();
+        let incumbent: Vec<Xy> = (0..=n).map(|i| Xy { x: i as f64, y: 0. }).collect();
+        let mut challenger = incumbent.clone();
+        challenger[1..n].iter_mut().for_each(|station| station.y = 1.);
         let mut edges: Vec<[[Edge; 2]; 2]> = costs
             .iter()
             .zip(collisions)
@@ -224,7 +228,7 @@ mod tests {
             })
             .collect();
         edges[0][1] = edges[0][0];
-        Trellis { incumbent: stations.clone(), challenger: stations, edges }
+        Trellis { incumbent, challenger, edges }
     }
 
     fn all_bits(n: usize) -> impl Iterator<Item = Bits> {
