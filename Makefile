@@ -20,12 +20,13 @@ system:
 		DEBIAN_FRONTEND=noninteractive $$sudo apt-get install -y -qq --no-install-recommends $(PACKAGES); \
 	fi
 
-$(VENV)/.ready: sitl/requirements.txt
+$(VENV)/.ready: sitl/requirements.txt sitl/requirements-alone.txt
 	$(PYTHON) -c 'import ensurepip' 2>/dev/null || { \
 		sudo=; [ "$$(id -u)" = 0 ] || sudo=sudo; \
 		$$sudo apt-get update -qq && $$sudo apt-get install -y -qq python3-venv; }
 	$(PYTHON) -m venv $(VENV)
 	$(VENV)/bin/pip install --quiet --disable-pip-version-check -r sitl/requirements.txt
+	$(VENV)/bin/pip install --quiet --disable-pip-version-check --no-deps -r sitl/requirements-alone.txt
 	touch $@
 
 build: system

@@ -3,7 +3,7 @@
 //!
 //! - [`options`]: what the commands have in common, with the names of the configuration file;
 //! - [`files`]: scenarios, missions and fences from files, results to files;
-//! - [`progress`]: what is shown while something runs;
+//! - [`progress`]: what is shown while something runs; [`terminal`]: what the terminal can show;
 //! - [`plan`], [`check`], [`once`], [`compare`], [`qaoa`]: one command each;
 //! - [`memory`]: what the machine has left;
 //! - [`exit`]: errors and their exit codes.
@@ -18,6 +18,7 @@ pub mod options;
 pub mod plan;
 pub mod progress;
 pub mod qaoa;
+pub mod terminal;
 
 use std::process::ExitCode;
 
@@ -87,6 +88,7 @@ fn start_log(verbose: u8, quiet: bool) {
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
         .with_target(false)
+        .with_ansi(terminal::has_colours(&std::io::stderr()))
         .without_time()
         .try_init();
 }

@@ -6,6 +6,7 @@ use quick_xml::Reader;
 use quick_xml::events::{BytesRef, BytesStart, Event};
 use serde_json::{Map, Value};
 
+use super::write::name_of;
 use crate::formats::Scenario;
 use crate::formats::error::{Located, Place, Problem};
 use crate::formats::feature::{Feature, Shape, Want, positions, scenario};
@@ -162,7 +163,12 @@ impl State {
 
 impl Placemark {
     fn feature(&self) -> Feature {
-        let properties = self.properties.clone();
+        let mut properties = self.properties.clone();
+        // A name that quavd's own writer made of the other properties says nothing.
+        let ours = name_of(&properties);
+        if let Some(name) = self.name.as_ref().filter(|name| Some(*name) != ours.as_ref()) {
+            properties.entry("name").or_insert_with(|| Value::String(name.clone()));
+        }
         Feature::named("placemark", self.number, properties, self.name.as_deref())
     }
 

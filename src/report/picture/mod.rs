@@ -5,22 +5,32 @@
 //! - `map`: obstacles, buffers, fences, candidates, old and new route;
 //! - `places`: the numbered waypoints, start and goal;
 //! - `chart`: axes and curves; `training`: the two charts of the QAOA rounds;
+//! - `interactive`: the map and the charts of the HTML report;
+//! - `braille`: the map on a terminal;
+//! - `png`: the picture in pixels;
 //! - `findings`: what is not clear, where a mission was only judged;
 //! - `legend`: what the colours mean.
 //!
 //! A mission over several zones is drawn for the zone with the most legs.
 
+mod braille;
 mod chart;
 mod findings;
+mod interactive;
 mod legend;
 mod map;
 mod places;
+mod png;
 mod scene;
 mod training;
 mod view;
 
 use svg::Document;
 use svg::node::element::{Group, Rectangle, Style, Text, Title};
+
+pub(super) use braille::braille;
+pub(super) use interactive::{InteractiveMap, charts, interactive};
+pub(super) use png::png;
 
 use super::run::Run;
 use super::text::{change, clearance, count, plain};
