@@ -10,5 +10,6 @@ mod compare;
 mod parameters;
 mod replacing;
 mod scenes;
+mod security;
 mod sitl;
 mod transfers;
