@@ -66,13 +66,7 @@ pub fn run(args: &CheckArgs, shown: &Shown) -> Result<String, CliError> {
     let options = args.safety.options();
     let verdict = judge(&input, &options)?;
     shown.warn(&scenario.warnings);
-    let run = Run {
-        options: &options,
-        warnings: &scenario.warnings,
-        fallback: None,
-        load,
-        total: began.elapsed(),
-    };
+    let run = Run { options: &options, warnings: &scenario.warnings, load, total: began.elapsed() };
     if !args.out.is_empty() {
         let fields = fields(&input, &options)?;
         let title = name_of(args.mission.as_ref().unwrap_or(&args.scenario));

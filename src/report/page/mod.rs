@@ -211,7 +211,8 @@ fn findings(report: &Report<'_>) -> Vec<String> {
     if report.planned.is_none() {
         findings.extend(blocked(report.before));
     }
-    findings.extend(report.run.fallback.map(|fallback| format!("Fallback: {fallback}")));
+    let fallback = report.planned.and_then(Replanned::fallback);
+    findings.extend(fallback.map(|fallback| format!("Fallback: {fallback}")));
     findings.extend(report.run.warnings.iter().chain(&report.before.warnings).cloned());
     let notes = report.planned.into_iter().flat_map(|planned| &planned.notes);
     findings.extend(notes.map(ToString::to_string));

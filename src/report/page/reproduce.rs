@@ -22,11 +22,13 @@ pub(crate) fn arguments(options: &Options) -> String {
         full_training,
         zone,
         inclusion,
+        deadline,
         ..
     } = SettingsDocument::from(options);
+    let deadline = deadline.map_or_else(String::new, |time| format!(" --deadline {time}"));
     let common = format!(
         " --shots {shots} --rounds {rounds} --seed {seed} --lambda {} --engine {engine} --zone {zone} \
-         --inclusion {inclusion}",
+         --inclusion {inclusion}{deadline}",
         lambda.0
     );
     // Only --paper trains every round in full.

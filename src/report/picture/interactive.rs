@@ -56,7 +56,7 @@ pub(in crate::report) fn interactive<'a>(
     let shown = View::new(page, low, high);
     // Drawn well beyond what is shown at first, for those who zoom out.
     let around = Rect { x: -WIDTH, y: -height, width: 3.0 * WIDTH, height: 3.0 * height };
-    let view = View { panel: around, ..shown };
+    let view = shown.within(around);
 
     let world = Group::new()
         .set("id", "world")
