@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(or $(CARGO_TARGET_DIR),target)/release/quavd
 PACKAGES := cmake g++ make pkg-config sqlite3 libsqlite3-dev python3-venv
 
-.PHONY: all build demo test test-rust test-python lint doc bench examples clean system
+.PHONY: all build demo test test-rust test-python lint doc bench fuzz examples gallery clean system
 
 all: build
 
@@ -57,6 +57,11 @@ lint: system
 doc: system
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --locked --no-deps
 
+# Fuzzing: RUNS executions of each target from the corpora in tests/fuzz.
+RUNS ?= 100000
+fuzz: system
+	tests/fuzz/run $(RUNS)
+
 bench: system
 	$(CARGO) bench --locked
 
@@ -68,6 +73,10 @@ examples: build
 		$(BIN) --quiet plan $$plan --out fence_examples/pictures/$$name.svg >/dev/null; \
 		code=$$?; [ $$code = 0 ] || [ $$code = 3 ] || exit $$code; \
 	done
+
+# A page of all examples with their reports: out/gallery/index.html.
+gallery: build
+	docs/gallery.sh $(BIN) out/gallery
 
 clean:
 	$(CARGO) clean

@@ -105,7 +105,9 @@ impl KeptPlan {
     /// and their type.
     pub(super) fn flattened(&self, now: &[MissionItem]) -> Vec<(usize, String)> {
         let located = self.located(now).enumerate();
-        let lost = located.filter(|(_, (entry, found))| entry.is_complex() && found.is_none());
+        let lost = located.filter(|(_, (entry, found))| {
+            entry.is_complex() && !entry.items.is_empty() && found.is_none()
+        });
         lost.map(|(index, (entry, _))| (index + 1, entry.kind())).collect()
     }
 
