@@ -11,6 +11,7 @@
 //! - [`geodesy`], [`airspace`]: positions, projections, and barriers in the plane;
 //! - [`planner`]: one leg: candidates, QAOA rounds, finish;
 //! - [`qaoa`]: Ising problems and the engines that run the circuit;
+//! - [`ibm`]: the same circuit on a QPU: line of qubits, native gates, OpenQASM;
 //! - [`baseline`]: A* and RRT, to compare with;
 //! - [`replan`]: a whole mission, and the judgement of any mission;
 //! - [`report`]: what is said and shown about it: JSON, a summary, a picture;
@@ -22,6 +23,7 @@ pub mod cli;
 pub mod fence;
 pub mod formats;
 pub mod geodesy;
+pub mod ibm;
 pub mod link;
 pub mod mission;
 pub mod planner;
