@@ -13,6 +13,7 @@
 //! - [`qaoa`]: Ising problems and the engines that run the circuit;
 //! - [`ibm`]: the same circuit on a QPU: line of qubits, native gates, OpenQASM;
 //! - [`baseline`]: A* and RRT, to compare with;
+//! - [`stop`]: calling all of that off, and its deadline;
 //! - [`replan`]: a whole mission, and the judgement of any mission;
 //! - [`report`]: what is said and shown about it: JSON, a summary, a picture;
 //! - [`cli`]: the commands of `quavd`.
@@ -30,6 +31,7 @@ pub mod planner;
 pub mod qaoa;
 pub mod replan;
 pub mod report;
+pub mod stop;
 pub mod store;
 pub mod units;
 pub mod vehicle;
