@@ -87,3 +87,28 @@ for name in NAMES:
     put("frames", name, b"\xff\x05hello" + answers(mission, 0) + b"\xff\x03\xfd\xfe\x00")
     ack = chunk(8, bytes([255, 190, 0, 0]))
     put("download", name, answers(mission, 0) + ack + answers(fence, 1))
+
+
+def device(qubits, entangler):
+    pairs = [[a, a + 1] for a in range(qubits - 1)]
+    configuration = {"backend_name": "ibm_small", "backend_version": "1.0.0", "n_qubits": qubits,
+                     "basis_gates": ["id", "rz", "sx", "x", entangler], "coupling_map": pairs,
+                     "dt": 0.5, "default_rep_delay": 250.0, "max_shots": 100000,
+                     "processor_type": {"family": "Heron", "revision": 2},
+                     "gates": [{"name": entangler, "coupling_map": pairs}]}
+    value = lambda name, number, unit: {"name": name, "value": number, "unit": unit,  # noqa: E731
+                                        "date": "2026-01-01T00:00:00Z"}
+    gate = lambda name, on, error, length: {  # noqa: E731
+        "gate": name, "qubits": on,
+        "parameters": [value("gate_error", error, ""), value("gate_length", length, "ns")]}
+    properties = {"backend_name": "ibm_small", "last_update_date": "2026-01-01T00:00:00Z",
+                  "qubits": [[value("T1", 250.0, "us"), value("T2", 100.0, "us"),
+                              value("readout_error", 0.01, ""), value("readout_length", 1500, "ns")]
+                             for _ in range(qubits)],
+                  "gates": [gate("sx", [q], 2e-4, 32) for q in range(qubits)]
+                  + [gate(entangler, pair, 3e-3, 68) for pair in pairs]}
+    return (json.dumps(configuration) + "\0" + json.dumps(properties)).encode()
+
+
+for qubits, entangler in [(2, "cz"), (3, "ecr"), (5, "cx"), (4, "cz"), (7, "ecr")]:
+    put("device", f"{qubits}-{entangler}", device(qubits, entangler))

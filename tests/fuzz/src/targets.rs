@@ -10,6 +10,7 @@ use quav::formats::{
     Scenario, read_fences, read_mission, read_scenario, write_fence_text, write_geojson, write_kml,
     write_kmz, write_plan, write_waypoints, write_waypoints_fence, write_waypoints_rally,
 };
+use quav::ibm::{Device, PhysicalQubit};
 use quav::link::message::{
     CommandAck, Heartbeat, MissionAck, MissionCount, MissionCurrent, MissionItemInt,
     MissionRequest, MissionRequestInt, StatusText,
@@ -26,12 +27,13 @@ use tokio_util::sync::CancellationToken;
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All of them.
-pub const ALL: [Target; 5] = [
+pub const ALL: [Target; 6] = [
     ("files", files),
     ("mission_items", mission_items),
     ("fence_items", fence_items),
     ("frames", frames),
     ("download", download),
+    ("device", device),
 ];
 
 /// Every file format, told apart by content as everywhere.
@@ -198,7 +200,8 @@ pub fn download(data: &[u8]) {
             if let Ok(vehicle) = find(&link, &search).await {
                 tokio::spawn(answering(far, answers));
                 for (kind, what) in [(MissionType::Mission, 0), (MissionType::Fence, 1)] {
-                    let work = vehicle.download(kind, &mut |_| {});
+                    let mut ignored = |_| {};
+                    let work = vehicle.download(kind, &mut ignored);
                     let got = tokio::time::timeout(Duration::from_secs(60), work).await;
                     match got {
                         Ok(Ok(got)) if what == 1 => drop(decode_fence(&got.items, None)),
@@ -228,6 +231,17 @@ async fn answering(mut far: DuplexStream, answers: Vec<Vec<u8>>) {
         {
             return;
         }
+    }
+}
+
+/// What IBM's service says about a backend: its two documents with a zero byte between them.
+pub fn device(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    let (configuration, properties) = text.split_once('\0').unwrap_or((text, text));
+    let Ok(device) = Device::parse(configuration, properties) else { return };
+    for index in 0..device.qubits().len() {
+        let qubit = device.qubit(PhysicalQubit(index as u32)).expect("it is in the list");
+        let _ = qubit.usable();
     }
 }
 
