@@ -12,6 +12,7 @@ from .dialect import FENCE, MISSION, RALLY, mavlink
 
 MAGIC = 0x763D
 MOST_DATA = 239
+HEADER_BYTES, ITEM_BYTES = 10, 38
 MOST_SESSIONS = 5
 SESSION_TIMEOUT_S = 3.0
 CLAIMED_SIZE = 1024 * 1024  # of every plan file
@@ -97,7 +98,7 @@ class Ftp:
             if session.mission_type is None or size > MOST_DATA:
                 answer.send(NAK, bytes([NO_FILE if size <= MOST_DATA else WRONG_SIZE]))
                 return
-            content = self._file(session.mission_type, faulty=True)[offset:offset + size]
+            content = self._file(session.mission_type, asked=range(offset, offset + size))[offset:offset + size]
             self._read_events(session.mission_type, offset, len(content))
             if content:
                 answer.send(ACK, content, offset)
@@ -117,22 +118,26 @@ class Ftp:
     def _read_events(self, mission_type, offset, length):
         """For the faults that strike after an item went through."""
         name = {MISSION: "mission", FENCE: "fence", RALLY: "rally"}[mission_type]
-        for seq in range(max(0, (offset - 10 + 37) // 38), max(0, (offset - 10 + length) // 38)):
+        begin, end = offset - HEADER_BYTES, offset - HEADER_BYTES + length
+        for seq in range(max(0, -(-begin // ITEM_BYTES)), max(0, end // ITEM_BYTES)):
             self.vehicle.event("download_item", type=name, item=seq, to=[])
 
-    def _file(self, mission_type, faulty=False):
+    def _file(self, mission_type, asked=range(0)):
+        """The whole file; faults strike what is in the bytes that were `asked` for."""
         items = list(self.vehicle.store.items[mission_type])
         if mission_type == MISSION and items:
             items[0] = home_item(self.vehicle.home)
         count = len(items)
-        if faulty:
+        if asked and asked.start < HEADER_BYTES:
             lie = self.vehicle.faults.take("lying-count", mission_type=mission_type)
             if lie:
                 count = lie.options["count"] if lie.options["count"] is not None else count + lie.options["delta"]
                 count = max(0, min(65535, count))
         content = [struct.pack("<HHHHH", MAGIC, mission_type, 0, 0, count)]
         for seq, item in enumerate(items):
-            bad = self.vehicle.faults.take("bad-value", mission_type=mission_type, item=seq) if faulty else None
+            starts = HEADER_BYTES + seq * ITEM_BYTES
+            is_asked = starts < asked.stop and asked.start < starts + ITEM_BYTES
+            bad = self.vehicle.faults.take("bad-value", mission_type=mission_type, item=seq) if is_asked else None
             content.append(item_bytes(bad.spoil(item) if bad else item, seq, mission_type))
         return b"".join(content)
 
