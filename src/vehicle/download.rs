@@ -171,10 +171,22 @@ fn is_refusal(result: MissionResult) -> bool {
     )
 }
 
+/// Answers to later requests after which a request counts as lost: fewer could be a line that
+/// changes the order (TCP's rule, RFC 5681, section 3.2).
+const OVERTAKEN: u32 = 3;
+
 /// One request under way.
 struct Asked {
     at: Instant,
     again: bool,
+    /// How many requests that were made later have been answered.
+    overtaken: u32,
+}
+
+impl Asked {
+    fn now(again: bool) -> Self {
+        Self { at: Instant::now(), again, overtaken: 0 }
+    }
 }
 
 /// PX4 keeps a cursor and ends the transfer over a request out of turn, so one request is under way
@@ -183,8 +195,8 @@ fn widest_window(autopilot: Autopilot) -> usize {
     if autopilot == Autopilot::ArduPilot { WIDEST_WINDOW } else { 1 }
 }
 
-/// MISSION_REQUEST_INT for each item, until all are there. The window grows up to `widest` while
-/// nothing is lost, and is halved when something is; a transfer that is begun again has one of one.
+/// MISSION_REQUEST_INT for each item, until all are there. The window grows up to `widest` with each
+/// answer and is halved when the line falls quiet; a transfer that is begun again has one of one.
 async fn items(
     exchange: &mut Exchange<'_>,
     count: u16,
@@ -199,7 +211,7 @@ async fn items(
     while held.len() < usize::from(count) {
         while asked.len() < window && next < count {
             request(exchange, next).await?;
-            asked.insert(next, Asked { at: Instant::now(), again: false });
+            asked.insert(next, Asked::now(false));
             next += 1;
         }
         let wait = exchange.round_trip.item_wait(exchange.timing());
@@ -215,6 +227,7 @@ async fn items(
                 held.insert(item.seq, item);
                 patience.renew();
                 tell(held.len());
+                ask_overtaken(exchange, &mut asked, request.at).await?;
             }
             // PX4 lost the thread, or the plan is shorter than was announced.
             Some(Heard::Ack { result, .. })
@@ -247,7 +260,24 @@ async fn ask_overdue(
     for (&seq, request_made) in asked.iter_mut() {
         if request_made.at.elapsed() >= wait {
             request(exchange, seq).await?;
-            *request_made = Asked { at: Instant::now(), again: true };
+            *request_made = Asked::now(true);
+        }
+    }
+    Ok(())
+}
+
+/// The autopilot answers in the order of the requests, so one that later ones overtook was lost, or
+/// its answer: no need to wait for the end of its time.
+async fn ask_overtaken(
+    exchange: &Exchange<'_>,
+    asked: &mut BTreeMap<u16, Asked>,
+    answered: Instant,
+) -> Result<(), TransferError> {
+    for (&seq, earlier) in asked.iter_mut().filter(|(_, earlier)| earlier.at < answered) {
+        earlier.overtaken += 1;
+        if earlier.overtaken >= OVERTAKEN {
+            request(exchange, seq).await?;
+            *earlier = Asked::now(true);
         }
     }
     Ok(())
