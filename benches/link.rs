@@ -41,7 +41,7 @@ use sitl::{FakeVehicle, PERSONAS, Session, search, waypoint};
 
 const BAUD: u32 = 57_600;
 /// Lossy runs at a time.
-const AT_ONCE: usize = 20;
+const AT_ONCE: usize = 12;
 const MISSION: MissionType = MissionType::Mission;
 const VEHICLE: Node = Node { system: SystemId(1), component: ComponentId(1) };
 
@@ -156,9 +156,9 @@ async fn slow_line(persona: &str, count: u16) {
 }
 
 /// One mission of 100 items up and verified over a link that loses 30 % each way: the time it took.
-async fn lossy_run(persona: &str, seed: u16) -> Result<f64, String> {
-    let text = seed.to_string();
-    let mut fake = FakeVehicle::start(&["--persona", persona, "--seed", &text]);
+async fn lossy_run(persona: &'static str, seed: u16) -> Result<f64, String> {
+    let start = move || FakeVehicle::start(&["--persona", persona, "--seed", &seed.to_string()]);
+    let mut fake = tokio::task::spawn_blocking(start).await.unwrap();
     let session = Session::open(&fake.endpoint(), search()).await;
     let vehicle = &session.vehicle;
     fake.fault("drop:p=0.3");
