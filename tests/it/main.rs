@@ -9,6 +9,7 @@ mod commands;
 mod compare;
 mod deadline;
 mod parameters;
+mod plan_files;
 mod replacing;
 mod scenes;
 mod security;
