@@ -47,7 +47,7 @@ fn success(device: &Device, demand: &Demand, path: &[usize]) -> f64 {
     let mut product = 1.0;
     for (place, &qubit) in path.iter().enumerate() {
         let bonds = path.len() - 1;
-        let left = place.checked_sub(1).unwrap_or(0);
+        let left = place.saturating_sub(1);
         let right = place.min(bonds - 1);
         let direction = |bond: usize| usize::from(forward(bond).is_none());
         let pulses = demand.pulses[place][direction(left)][direction(right)];
