@@ -7,7 +7,7 @@ VENV_IBM := .venv-ibm
 BIN := $(or $(CARGO_TARGET_DIR),target)/release/quavd
 PACKAGES := cmake g++ make pkg-config sqlite3 libsqlite3-dev python3-venv
 
-.PHONY: all build demo test test-rust test-python test-ibm lint doc bench bench-link examples clean system
+.PHONY: all build demo test test-rust test-python test-ibm lint doc bench bench-link bench-ibm examples clean system
 
 all: build
 
@@ -72,7 +72,7 @@ bench: system
 
 # Transfers on a 57,600 baud line and on one that loses 30 % each way.
 bench-link: system $(VENV)/.ready
-	QUAV_PYTHON=$(CURDIR)/$(VENV)/bin/python QUAV_IBM_PYTHON=$(CURDIR)/$(VENV_IBM)/bin/python $(CARGO) bench --locked --bench link
+	QUAV_PYTHON=$(CURDIR)/$(VENV)/bin/python $(CARGO) bench --locked --bench link
 
 # The circuit and the line of qubits on IBM's devices, beside qiskit's.
 bench-ibm: system $(VENV_IBM)/.ready

@@ -2,7 +2,7 @@
 
 The noise is Aer's `NoiseModel.from_backend` (depolarisation to the calibrated gate error, thermal relaxation during
 gates, readout errors), Pauli-twirled: each gate's channel keeps the probabilities of its Pauli errors and loses its
-coherences. What twirling changes at 8 qubits is measured by `test_noisy.py`. Qubits that wait do not relax, as in Aer.
+coherences. What that changes in small circuits is measured by `ibm/test_noisy.py`. Qubits that wait do not relax, as in Aer.
 
 A Pauli error is carried to the end of the circuit: a Clifford gate turns it into another Pauli, and a rotation that it
 does not commute with changes its sign. So a shot with errors is a shot of a circuit of the same shape with some signs
@@ -10,13 +10,14 @@ changed, and some bits flipped afterwards. Many such circuits are run at once as
 on the same two qubits are multiplied first; as `RZZ` and a single entangling gate have Schmidt rank 2, a chain of p layers
 needs bonds of 2^p and nothing is ever cut off: the simulation is exact.
 
-Circuits that are not on a line, or too deep for it, are left to Aer with the same twirled noise.
+Circuits that are not on a line, or too deep for it, are left to Aer with the same twirled noise: slow, but the same.
 """
 
 import functools
 import itertools
 
 import numpy as np
+from qiskit.circuit.library import ECRGate, RZZGate
 from qiskit.quantum_info import Pauli, SuperOp
 from qiskit_aer import AerSimulator
 from qiskit_aer.noise import NoiseModel, pauli_error
@@ -79,15 +80,18 @@ class Twirled:
         table = np.asarray(error.probabilities)
         return float(table[0, 1]), float(table[1, 0])
 
-    def aer(self):
-        """The same noise for Aer; the reference that the tests compare with."""
+    def aer(self, physical, twirled=True):
+        """The noise of these qubits as a model for Aer, where they are numbered from 0."""
+        place = {qubit: k for k, qubit in enumerate(physical)}
         model = NoiseModel(basis_gates=self.model.basis_gates)
         for gate, errors in self.errors.items():
-            for physical in errors:
-                if gate in ("sx", "x", "rx", "ecr", "cz", "rzz") and (terms := self.paulis(gate, physical)):
-                    model.add_quantum_error(pauli_error(list(terms)), gate, list(physical))
-        for physical, error in self.readouts.items():
-            model.add_readout_error(error, list(physical))
+            for pair, error in errors.items():
+                if gate not in ("reset", "measure") and all(qubit in place for qubit in pair):
+                    known = pauli_error(list(self.paulis(gate, pair))) if twirled else error
+                    model.add_quantum_error(known, gate, [place[qubit] for qubit in pair])
+        for (qubit,), error in self.readouts.items():
+            if qubit in place:
+                model.add_readout_error(error, [place[qubit]])
         return model
 
 
@@ -263,8 +267,35 @@ def draw(sites, row_of_shot, rng):
     return bits
 
 
+@functools.lru_cache(maxsize=4)
+def noise_of(backend):
+    """The noise of a backend; making it takes seconds."""
+    return Twirled(backend)
+
+
 def sample(circuit, physical, noise, shots, seed):
     """Bits that are read, (shots, clbits) with clbit 0 first; `physical[q]` is qubit q of the circuit on the QPU."""
+    try:
+        return on_a_line(circuit, physical, noise, shots, seed)
+    except NotALine:
+        return with_aer(circuit, physical, noise, shots, seed)
+
+
+def with_aer(circuit, physical, noise, shots, seed, twirled=True):
+    """The same by Aer."""
+    known = {"ecr": ECRGate, "rzz": RZZGate}
+    native = circuit.copy_empty_like()
+    for instruction in circuit.data:
+        operation = instruction.operation
+        operation = known.get(operation.name, lambda *_: operation)(*operation.params)
+        native.append(operation, instruction.qubits, instruction.clbits)
+    simulator = AerSimulator(noise_model=noise.aer(physical, twirled), max_parallel_threads=1)
+    memory = simulator.run(native, shots=shots, memory=True, seed_simulator=seed).result().get_memory()
+    return np.array([[bit == "1" for bit in reversed(shot.replace(" ", ""))] for shot in memory], dtype=bool)
+
+
+def on_a_line(circuit, physical, noise, shots, seed):
+    """The same by matrix product states."""
     rng = np.random.default_rng(seed)
     gates, measured = compose(circuit)
     order = line_of(gates, circuit.num_qubits)
