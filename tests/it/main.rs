@@ -8,6 +8,7 @@ mod campaign;
 mod commands;
 mod compare;
 mod deadline;
+mod ibm_circuits;
 mod parameters;
 mod plan_files;
 mod replacing;
