@@ -23,6 +23,7 @@ pub mod cli;
 pub mod fence;
 pub mod formats;
 pub mod geodesy;
+pub mod ibm;
 pub mod link;
 pub mod mission;
 pub mod planner;

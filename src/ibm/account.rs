@@ -6,6 +6,7 @@
 use std::fmt;
 use std::fs;
 use std::io::Read;
+use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -177,12 +178,11 @@ fn address(what: &'static str, text: &str) -> Result<Url, AccountError> {
             why: "it holds a user name or password".to_owned(),
         });
     }
-    let here = match url.host() {
-        Some(url::Host::Domain(name)) => name == "localhost",
-        Some(url::Host::Ipv4(ip)) => ip.is_loopback(),
-        Some(url::Host::Ipv6(ip)) => ip.is_loopback(),
-        None => return Err(refused("it names no host".to_owned())),
+    let Some(host) = url.host_str() else {
+        return Err(refused("it names no host".to_owned()));
     };
+    let ip = host.trim_matches(['[', ']']).parse::<IpAddr>();
+    let here = ip.map_or(host == "localhost", |ip| ip.is_loopback());
     match url.scheme() {
         "https" => Ok(url),
         "http" if here => Ok(url),
