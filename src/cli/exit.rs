@@ -96,7 +96,14 @@ impl From<IbmError> for CliError {
     }
 }
 
-usage_errors!(FileError, FormatError, FenceItemError, QaoaCommandError, StoreError);
+usage_errors!(
+    FileError,
+    FormatError,
+    FenceItemError,
+    QaoaCommandError,
+    StoreError,
+    crate::link::SigningError
+);
 
 impl From<ReplanError> for CliError {
     fn from(error: ReplanError) -> Self {

@@ -11,12 +11,13 @@ use super::files::{self, out_format};
 use super::options::{PlanningArgs, as_qpu};
 use super::plan::{Delivered, Outcome, planned_scenario};
 use super::progress::Shown;
+use super::signing::SigningArgs;
 use crate::fence::FenceSet;
 use crate::fence::items::decode_fence;
 use crate::formats::Scenario;
 use crate::geodesy::LatLon;
 use crate::ibm::qpu::IbmQpu;
-use crate::link::{ComponentId, Endpoint, Identity, Link, SystemId, Transport};
+use crate::link::{ComponentId, Endpoint, Identity, Link, Signer, SystemId, Transport};
 use crate::mission::{self, Mission, MissionItem, MissionType};
 use crate::replan::{self, Input, Options, Replanned, replan_with};
 use crate::report::picture::picture;
@@ -62,6 +63,9 @@ pub struct OnceArgs {
     /// .svg). May be repeated.
     #[arg(long, value_name = "FILE")]
     pub out: Vec<PathBuf>,
+    /// Who is believed.
+    #[command(flatten)]
+    pub signing: SigningArgs,
     /// How to plan.
     #[command(flatten)]
     pub planning: PlanningArgs,
@@ -83,7 +87,11 @@ pub fn run(args: OnceArgs, shown: &Shown) -> Result<String, CliError> {
     runtime.block_on(async {
         let cancel = CancellationToken::new();
         shown.doing(format!("connecting to {}", args.connect));
-        let transport = Transport::open(&args.connect).await?;
+        let mut transport = Transport::open(&args.connect).await?;
+        if let Some(settings) = args.signing.settings() {
+            let state = state_directory(args.state_dir.as_ref())?;
+            transport = transport.signed(Signer::open(&settings, &state)?);
+        }
         let identity = Identity {
             system: SystemId(args.system.unwrap_or(1)),
             component: ComponentId(args.component),

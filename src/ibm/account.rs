@@ -265,9 +265,8 @@ fn look_up(
     private: bool,
 ) -> Result<(String, String), AccountError> {
     let Place { what, variable, option, credential } = place;
-    let from_file = |path: &Path| {
-        read(what, path, private).map(|text| (text, path.display().to_string()))
-    };
+    let from_file =
+        |path: &Path| read(what, path, private).map(|text| (text, path.display().to_string()));
     if let Some(path) = file {
         return from_file(path);
     }
@@ -314,7 +313,8 @@ mod tests {
         assert_eq!(crn.region(), "eu-de");
         assert!(!crn.to_string().contains("0123"));
         assert_eq!(crn.removed_from(&format!("no {CRN} here")), "no <crn> here");
-        for bad in ["", "crn:v1", &CRN.replace("quantum-computing", "vpc"), &CRN.replace("eu-de", "")]
+        for bad in
+            ["", "crn:v1", &CRN.replace("quantum-computing", "vpc"), &CRN.replace("eu-de", "")]
         {
             assert!(bad.parse::<Crn>().is_err(), "{bad}");
         }
@@ -340,10 +340,8 @@ mod tests {
         writeln!(key, "secret-key").unwrap();
         let mut crn = tempfile::NamedTempFile::new().unwrap();
         writeln!(crn, "{CRN}").unwrap();
-        let files = CredentialFiles {
-            key: Some(key.path().to_owned()),
-            crn: Some(crn.path().to_owned()),
-        };
+        let files =
+            CredentialFiles { key: Some(key.path().to_owned()), crn: Some(crn.path().to_owned()) };
         assert!(Credentials::find(&files).is_ok());
         let open = fs::Permissions::from_mode(0o644);
         fs::set_permissions(key.path(), open).unwrap();

@@ -6,7 +6,12 @@ use crate::qaoa::qpu::QpuCircuit;
 
 /// 32 hexadecimal digits that stand for the request. Not the circuits' text: that depends on the
 /// calibration of the hour, and a job that was paid for is wanted all the same.
-pub(super) fn digest(backend: &str, number: usize, circuits: &[QpuCircuit<'_>], shots: u32) -> String {
+pub(super) fn digest(
+    backend: &str,
+    number: usize,
+    circuits: &[QpuCircuit<'_>],
+    shots: u32,
+) -> String {
     let mut hash = Sha256::new();
     let mut feed = |bytes: &[u8]| {
         hash.update((bytes.len() as u64).to_le_bytes());

@@ -48,7 +48,9 @@ pub enum IbmError {
         available: Vec<String>,
     },
     /// A backend that exists but takes no jobs at present.
-    #[error("{name} is {status} and would only hold the job; use --backend least_busy, or try later")]
+    #[error(
+        "{name} is {status} and would only hold the job; use --backend least_busy, or try later"
+    )]
     NotOnline {
         /// The backend.
         name: String,

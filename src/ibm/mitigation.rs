@@ -1,8 +1,8 @@
 //! Readout errors taken out of an expectation.
 
 use super::device::Readout;
-use crate::qaoa::engine::Sample;
 use crate::qaoa::ChainIsing;
+use crate::qaoa::engine::Sample;
 
 /// ⟨H⟩ of what was read with each qubit's known readout errors taken out, and its standard error.
 #[must_use]

@@ -23,7 +23,9 @@ use super::lower::{Binding, lower, lower_on};
 use super::metrics::Metrics;
 use super::mitigation::mitigated_expectation;
 use super::program::{Program, Pub, Sampler};
-use crate::qaoa::qpu::{JobPlan, Measured, Qpu, QpuCircuit, QpuError, QpuUse, Use, sampled_expectation};
+use crate::qaoa::qpu::{
+    JobPlan, Measured, Qpu, QpuCircuit, QpuError, QpuUse, Use, sampled_expectation,
+};
 use crate::qaoa::{Angles, ChainIsing};
 use crate::stop::{Stop, Stopped};
 
@@ -74,13 +76,12 @@ impl IbmQpu {
     /// # Errors
     /// [`IbmError`] where no runtime for the network can be made.
     pub fn new(client: Client, choice: BackendChoice, ledger: Ledger) -> Result<Self, IbmError> {
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .build()
-            .map_err(|error| IbmError::Unreachable {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(
+            |error| IbmError::Unreachable {
                 host: "the network".to_owned(),
                 cause: error.to_string(),
-            })?;
+            },
+        )?;
         Ok(Self {
             runtime,
             client,
@@ -284,7 +285,9 @@ impl IbmQpu {
                     Err(error) => {
                         // It stays on record, for the next run to cancel.
                         self.own.remove(&record.digest);
-                        warn!("a job may still be queued, and is cancelled by the next run: {error}");
+                        warn!(
+                            "a job may still be queued, and is cancelled by the next run: {error}"
+                        );
                         interrupted
                     }
                 });
@@ -410,15 +413,11 @@ impl From<Interrupted> for QpuError {
         match interrupted {
             Interrupted::Failed(error) => {
                 let late = matches!(error, IbmError::Deadline { .. });
-                Self {
-                    reason: error.to_string(),
-                    stopped: late.then_some(Stopped::DeadlinePassed),
-                }
+                Self { reason: error.to_string(), stopped: late.then_some(Stopped::DeadlinePassed) }
             }
-            Interrupted::Stopped(Stopped::Cancelled, _) => Self {
-                reason: IbmError::CalledOff.to_string(),
-                stopped: Some(Stopped::Cancelled),
-            },
+            Interrupted::Stopped(Stopped::Cancelled, _) => {
+                Self { reason: IbmError::CalledOff.to_string(), stopped: Some(Stopped::Cancelled) }
+            }
             Interrupted::Stopped(stopped, after) => Self {
                 reason: IbmError::Deadline { after, job: None }.to_string(),
                 stopped: Some(stopped),
@@ -468,9 +467,8 @@ impl Qpu for IbmQpu {
             let circuit = lower(device, &chain, Binding::Bound(&Angles::ramp(layers)))
                 .map_err(|error| Interrupted::Failed(IbmError::Circuit(error.to_string())))?;
             let shot = f64::from(shots) * shot_seconds(device, &circuit);
-            let seconds = |kind: &JobPlan| {
-                kind.jobs as f64 * (JOB_SECONDS + kind.circuits as f64 * shot)
-            };
+            let seconds =
+                |kind: &JobPlan| kind.jobs as f64 * (JOB_SECONDS + kind.circuits as f64 * shot);
             (plan.iter().map(seconds).sum::<f64>(), name.clone())
         };
         let usage = self.until(stop, self.client.usage())?;

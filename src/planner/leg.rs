@@ -215,8 +215,7 @@ impl LegPlanner {
         )?;
         reaches_are_clear(request, space, &finished.points)?;
         times.finish = began.elapsed();
-        let plan =
-            LegPlan { finished, candidates: found, rounds, cut_short, fallback, times };
+        let plan = LegPlan { finished, candidates: found, rounds, cut_short, fallback, times };
         Ok(LegOutcome::Replanned(Box::new(plan)))
     }
 }

@@ -95,7 +95,9 @@ pub enum EngineError {
         j: usize,
     },
     /// A QPU was asked for where only simulators run.
-    #[error("the ibm engine is no simulator; it runs with quavd plan, once and run, and with quavd ibm run")]
+    #[error(
+        "the ibm engine is no simulator; it runs with quavd plan, once and run, and with quavd ibm run"
+    )]
     NoQpu,
     /// The workspace would not fit.
     #[error(

@@ -336,9 +336,8 @@ mod tests {
     fn the_estimated_gradient_agrees_with_the_exact_one_within_its_error() {
         let chain = chain();
         let angles = Angles::ramp(3);
-        let (_, exact) = ChainEngine::new(chain.clone(), 1 << 30)
-            .expectation_and_gradient(&angles)
-            .unwrap();
+        let (_, exact) =
+            ChainEngine::new(chain.clone(), 1 << 30).expectation_and_gradient(&angles).unwrap();
         let shots = 200_000;
         let shifted = shifts(&angles);
         let points: Vec<_> =

@@ -68,7 +68,8 @@ pub fn plan_summary(result: &Replanned, run: &Run<'_>) -> String {
 
 /// What was used of a QPU.
 fn qpu_use(used: &QpuUse) -> String {
-    let QpuUse { backend, jobs, picked_up, circuits, estimated_seconds, charged_seconds, .. } = used;
+    let QpuUse { backend, jobs, picked_up, circuits, estimated_seconds, charged_seconds, .. } =
+        used;
     let backend = if backend.is_empty() { "none" } else { backend };
     let picked = match picked_up {
         0 => String::new(),

@@ -11,5 +11,6 @@ mod deadline;
 mod parameters;
 mod replacing;
 mod scenes;
+mod security;
 mod sitl;
 mod transfers;

@@ -36,14 +36,12 @@ impl AccountArgs {
     /// # Errors
     /// [`CliError::Usage`] without usable credentials.
     pub fn client(&self) -> Result<Client, CliError> {
-        let files =
-            CredentialFiles { key: self.api_key_file.clone(), crn: self.crn_file.clone() };
+        let files = CredentialFiles { key: self.api_key_file.clone(), crn: self.crn_file.clone() };
         let usage = |error: crate::ibm::account::AccountError| CliError::Usage(error.to_string());
         let credentials = Credentials::find(&files).map_err(usage)?;
         let region = credentials.crn.region();
-        let endpoints =
-            Endpoints::new(self.iam_url.as_deref(), self.api_url.as_deref(), region)
-                .map_err(usage)?;
+        let endpoints = Endpoints::new(self.iam_url.as_deref(), self.api_url.as_deref(), region)
+            .map_err(usage)?;
         Ok(Client::new(endpoints, credentials, Patience::default())?)
     }
 

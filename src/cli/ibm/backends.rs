@@ -41,7 +41,10 @@ pub(super) fn run(args: &BackendsArgs) -> Result<String, CliError> {
                 })
             })
             .collect();
-        return Ok(format!("{:#}\n", json!({ "backends": listed, "qpu_seconds_left": usage.left() })));
+        return Ok(format!(
+            "{:#}\n",
+            json!({ "backends": listed, "qpu_seconds_left": usage.left() })
+        ));
     }
     let mut text = String::new();
     for backend in &backends {

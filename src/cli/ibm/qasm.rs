@@ -18,13 +18,20 @@ pub struct QasmArgs {
     pub target: TargetArgs,
     /// γ of each layer, comma-separated; with --betas. Without them the angles are inputs.
     #[arg(
-        long, value_delimiter = ',', allow_hyphen_values = true, requires = "betas",
-        value_name = "RAD", conflicts_with = "layers"
+        long,
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        requires = "betas",
+        value_name = "RAD",
+        conflicts_with = "layers"
     )]
     pub gammas: Option<Vec<f64>>,
     /// β of each layer.
     #[arg(
-        long, value_delimiter = ',', allow_hyphen_values = true, requires = "gammas",
+        long,
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        requires = "gammas",
         value_name = "RAD"
     )]
     pub betas: Option<Vec<f64>>,
@@ -39,9 +46,8 @@ pub(super) fn run(args: &QasmArgs) -> Result<String, CliError> {
         ),
         _ => None,
     };
-    let binding = angles
-        .as_ref()
-        .map_or(Binding::Inputs(usize::from(args.chain.layers)), Binding::Bound);
+    let binding =
+        angles.as_ref().map_or(Binding::Inputs(usize::from(args.chain.layers)), Binding::Bound);
     let device = args.target.device(chain.qubits())?;
     let circuit =
         lower(&device, &chain, binding).map_err(|error| CliError::Usage(error.to_string()))?;

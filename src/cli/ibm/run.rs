@@ -109,9 +109,8 @@ pub(super) fn run(args: &RunArgs) -> Result<String, CliError> {
     let in_units = |energy: f64| scaled.in_input_units(energy);
     let (raw, error) =
         (in_units(measured.raw_expectation), measured.standard_error * scaled.factor);
-    let loss_errors: Option<Vec<f64>> = trained
-        .as_ref()
-        .map(|t| t.loss_errors.iter().map(|error| error * scaled.factor).collect());
+    let loss_errors: Option<Vec<f64>> =
+        trained.as_ref().map(|t| t.loss_errors.iter().map(|error| error * scaled.factor).collect());
     let loss = match trained {
         Some(trained) => trained.loss.into_iter().map(in_units).collect(),
         None => ideal.loss,

@@ -194,18 +194,13 @@ fn chosen(
     choice: &BackendChoice,
     qubits: usize,
 ) -> Result<Backend, IbmError> {
-    let names = || {
-        backends
-            .iter()
-            .map(|backend| super::visible(&backend.name))
-            .collect::<Vec<_>>()
-    };
+    let names = || backends.iter().map(|backend| super::visible(&backend.name)).collect::<Vec<_>>();
     match choice {
         BackendChoice::Named(name) => {
             let available = names();
             let found = backends.into_iter().find(|backend| backend.name == *name);
-            let found = found
-                .ok_or_else(|| IbmError::NoSuchBackend { name: name.clone(), available })?;
+            let found =
+                found.ok_or_else(|| IbmError::NoSuchBackend { name: name.clone(), available })?;
             if found.is_online() {
                 return Ok(found);
             }
@@ -219,7 +214,9 @@ fn chosen(
                 .into_iter()
                 .filter(|backend| backend.is_online() && fits(backend))
                 .filter(|backend| backend.is_simulator != Some(true))
-                .min_by_key(|backend| (backend.queue_length.unwrap_or(u64::MAX), backend.name.clone()))
+                .min_by_key(|backend| {
+                    (backend.queue_length.unwrap_or(u64::MAX), backend.name.clone())
+                })
                 .ok_or(IbmError::NoneOnline { available })
         }
     }
@@ -259,7 +256,10 @@ mod tests {
     #[test]
     fn what_is_left_is_known_where_there_is_a_limit() {
         let usage = |text: &str| serde_json::from_str::<Usage>(text).unwrap().left();
-        assert_eq!(usage(r#"{"usage_consumed_seconds":12,"usage_limit_seconds":600}"#), Some(588.0));
+        assert_eq!(
+            usage(r#"{"usage_consumed_seconds":12,"usage_limit_seconds":600}"#),
+            Some(588.0)
+        );
         assert_eq!(usage(r#"{"usage_limit_seconds":600,"usage_limit_reached":true}"#), Some(0.0));
         assert_eq!(usage("{}"), None);
     }

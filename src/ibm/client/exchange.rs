@@ -100,8 +100,7 @@ impl Reply {
         if !self.is_json {
             return Err(IbmError::malformed(what, "it is no JSON; check the API's address"));
         }
-        std::str::from_utf8(&self.body)
-            .map_err(|_| IbmError::malformed(what, "it is not UTF-8"))
+        std::str::from_utf8(&self.body).map_err(|_| IbmError::malformed(what, "it is not UTF-8"))
     }
 
     /// What an error body says.
@@ -190,7 +189,10 @@ mod tests {
     #[test]
     fn every_form_of_error_body_is_read() {
         let new = said(r#"{"errors":[{"code":1517,"message":"no","solution":"do"}],"trace":"t"}"#);
-        assert_eq!((new.code, new.text.as_str()), (Some(1517), "no do [HTTP 400, code 1517, trace t]"));
+        assert_eq!(
+            (new.code, new.text.as_str()),
+            (Some(1517), "no do [HTTP 400, code 1517, trace t]")
+        );
         assert_eq!(said(r#"{"errors":[{"code":"1234","message":"x"}]}"#).code, Some(1234));
         assert_eq!(said(r#"{"error":{"code":7,"message":"old"}}"#).code, Some(7));
         let iam = said(r#"{"errorCode":"BXNIM0415E","errorMessage":"Provided API key"}"#);

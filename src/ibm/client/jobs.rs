@@ -188,9 +188,10 @@ impl Client {
                 Ok(reply) => {
                     const WHAT: &str = "POST /jobs";
                     // An answer that cannot be read leaves a job behind: it is found by its tag.
-                    match reply.document(WHAT).and_then(|created: Created| {
-                        checked_id(created.id, WHAT)
-                    }) {
+                    match reply
+                        .document(WHAT)
+                        .and_then(|created: Created| checked_id(created.id, WHAT))
+                    {
                         Ok(id) => {
                             info!(job = id, backend, "submitted");
                             return Ok(id);

@@ -24,8 +24,8 @@ use tracing::debug;
 
 use super::account::{Credentials, Endpoints};
 use super::error::IbmError;
-use exchange::{NoAnswer, Reply, exchange};
 pub(crate) use exchange::visible;
+use exchange::{NoAnswer, Reply, exchange};
 use token::Tokens;
 
 /// The only version that is `live`; without the header the service answers in its oldest form.
@@ -82,11 +82,7 @@ pub struct Client {
 /// Why a request has no result.
 enum CallError {
     /// The service refused it.
-    Refused {
-        status: u16,
-        code: Option<i64>,
-        error: IbmError,
-    },
+    Refused { status: u16, code: Option<i64>, error: IbmError },
     /// It has not happened.
     Failed(IbmError),
     /// It may have happened.
@@ -273,6 +269,7 @@ impl Client {
 /// A pause a little longer, differently each time, so that clients that failed together do not come
 /// back together.
 fn jittered(pause: Duration) -> Duration {
-    let nanos = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |t| t.subsec_nanos());
+    let nanos =
+        SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |t| t.subsec_nanos());
     pause.mul_f64(1.0 + 0.1 * f64::from(nanos % 1000) / 1000.0)
 }
