@@ -30,7 +30,7 @@ def parser():
     add("--key", default="FAKE-API-KEY-0000", help="the API key that it knows (default: %(default)s)")
     add("--crn", default=CRN, help="the instance that it knows")
     add("--token-life", type=float, default=3600, metavar="S", help="how long a token lives (default: 3600)")
-    add("--noise", choices=sorted(sampling.SAMPLERS), default="none",
+    add("--noise", choices=sorted(sampling.SAMPLERS), default="qpu",
         help="none: ideal QPUs; qpu: their recorded errors (default)")
     add("--rate-limit", type=int, default=5, metavar="N", help="submissions a minute, 0: any number (default: 5)")
     add("--clock-scale", type=float, default=1.0, metavar="X", help="its clock runs X times as fast (default: 1)")

@@ -26,6 +26,8 @@ pub mod mitigation;
 pub mod program;
 mod qasm;
 pub mod qpu;
+#[cfg(test)]
+mod samples;
 pub mod secret;
 mod segments;
 #[cfg(test)]
