@@ -215,12 +215,12 @@ pub fn run_of(
             count: *count,
         });
     let certificate = exact_optimum.map(|exact_optimum| {
-        let shots: f64 = measured.samples.iter().map(|sample| f64::from(sample.count)).sum();
+        let shots: u32 = measured.samples.iter().map(|sample| sample.count).sum();
         let close = 1e-9 * exact_optimum.abs().max(1.0);
         let optimal = |sample: &&Sample| ising.energy(&sample.bits) <= exact_optimum + close;
-        let hits: f64 = measured.samples.iter().filter(optimal).map(|s| f64::from(s.count)).sum();
+        let hits: u32 = measured.samples.iter().filter(optimal).map(|sample| sample.count).sum();
         let gap = best.as_ref().map(|best| (best.energy - exact_optimum).max(0.0));
-        Certificate { exact_optimum, gap, p_optimum: hits / shots }
+        Certificate { exact_optimum, gap, p_optimum: f64::from(hits) / f64::from(shots) }
     });
     QaoaRun {
         engine: EngineKind::Ibm,
