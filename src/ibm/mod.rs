@@ -2,7 +2,8 @@
 //!
 //! The pure half, which does no I/O: [`device`] is what IBM says about one QPU ([`snapshot`] reads it
 //! from the two REST documents), [`line`](mod@line) the physical qubits a chain is laid on, [`circuit`] native
-//! gates on them, [`lower`] the way from an Ising chain to such a circuit, and `qasm` its text ([`Circuit::to_qasm`]).
+//! gates on them, [`lower`] the way from an Ising chain to such a circuit, and `qasm` its text
+//! ([`Circuit::to_qasm`]). [`unfolding`] takes readout errors out of what was measured.
 
 mod builder;
 pub mod circuit;
@@ -20,6 +21,7 @@ mod segments;
 mod simulate;
 pub mod snapshot;
 mod turns;
+pub mod unfolding;
 
 pub use circuit::{Angle, Circuit, Gate, Parameter};
 pub use device::{Device, Entangler, Native, PhysicalQubit};
