@@ -23,6 +23,7 @@ use super::lower::{Binding, lower, lower_on};
 use super::metrics::Metrics;
 use super::mitigation::mitigated_expectation;
 use super::program::{Program, Pub, Sampler};
+use super::unfolding::unfolded;
 use crate::qaoa::qpu::{
     JobPlan, Measured, Qpu, QpuCircuit, QpuError, QpuUse, Use, sampled_expectation,
 };
@@ -319,7 +320,15 @@ impl IbmQpu {
                 let (raw_expectation, _) = sampled_expectation(circuit.chain, &samples);
                 let (expectation, standard_error) =
                     mitigated_expectation(circuit.chain, &samples, &readout);
-                Measured { samples, expectation, raw_expectation, standard_error }
+                let probabilities = match purpose {
+                    Use::Sampling => unfolded(&samples, &readout),
+                    // Nothing but expectations is wanted.
+                    Use::Training => samples
+                        .iter()
+                        .map(|sample| f64::from(sample.count) / f64::from(shots))
+                        .collect(),
+                };
+                Measured { samples, probabilities, expectation, raw_expectation, standard_error }
             })
             .collect())
     }

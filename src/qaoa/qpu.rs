@@ -47,6 +47,8 @@ pub enum Use {
 pub struct Measured {
     /// Distinct bitstrings in ascending order, as they were read.
     pub samples: Vec<Sample>,
+    /// The probability of each of them, with readout errors taken out.
+    pub probabilities: Vec<f64>,
     /// ⟨H⟩ with readout errors taken out, in units of the chain.
     pub expectation: f64,
     /// ⟨H⟩ as it was read.
@@ -195,7 +197,7 @@ fn shifts(angles: &Angles) -> Vec<Angles> {
 }
 
 /// What was measured at angles that apply to the scaled problem, in the form of every run. The
-/// probability of the optimum is its share of the shots.
+/// probability of the optimum is what was measured.
 #[must_use]
 pub fn run_of(
     ising: &Ising,
@@ -215,12 +217,13 @@ pub fn run_of(
             count: *count,
         });
     let certificate = exact_optimum.map(|exact_optimum| {
-        let shots: u32 = measured.samples.iter().map(|sample| sample.count).sum();
         let close = 1e-9 * exact_optimum.abs().max(1.0);
-        let optimal = |sample: &&Sample| ising.energy(&sample.bits) <= exact_optimum + close;
-        let hits: u32 = measured.samples.iter().filter(optimal).map(|sample| sample.count).sum();
+        let optimal =
+            |(sample, _): &(&Sample, &f64)| ising.energy(&sample.bits) <= exact_optimum + close;
+        let probabilities = measured.samples.iter().zip(&measured.probabilities);
+        let p_optimum = probabilities.filter(optimal).fold(0.0, |sum, (_, p)| sum + p);
         let gap = best.as_ref().map(|best| (best.energy - exact_optimum).max(0.0));
-        Certificate { exact_optimum, gap, p_optimum: f64::from(hits) / f64::from(shots) }
+        Certificate { exact_optimum, gap, p_optimum }
     });
     QaoaRun {
         engine: EngineKind::Ibm,
@@ -304,7 +307,14 @@ pub(crate) mod testing {
                 let mut engine = ChainEngine::new(circuit.chain.clone(), 1 << 30);
                 let samples = engine.sample(circuit.angles, shots, &mut self.rng).unwrap();
                 let (expectation, standard_error) = sampled_expectation(circuit.chain, &samples);
-                Measured { samples, expectation, raw_expectation: expectation, standard_error }
+                let share = |sample: &Sample| f64::from(sample.count) / f64::from(shots);
+                Measured {
+                    probabilities: samples.iter().map(share).collect(),
+                    samples,
+                    expectation,
+                    raw_expectation: expectation,
+                    standard_error,
+                }
             };
             Ok(circuits.iter().map(measure).collect())
         }
