@@ -3,8 +3,11 @@
 
 use super::growth::{Grower, Growth};
 use super::measure::{Measured, Method};
-use super::{Comparison, PaperFigures, picture};
+use super::{Comparison, PaperFigures, ScenarioResult, picture};
 use crate::report::page::html::{data, page, section, table};
+
+/// What a cell of a table says of something.
+type Figure<T> = fn(&T) -> String;
 
 /// The page of a comparison that `command` made.
 #[must_use]
@@ -16,7 +19,7 @@ pub fn comparison_page(comparison: &Comparison, command: &str) -> String {
          alike. Lengths in metres; RRT: means over its seeds.</p>\n"
     );
     content += &section("Lengths", &lengths(comparison));
-    let blocks: [(&str, fn(&Measured) -> String); 4] = [
+    let blocks: [(&str, Figure<Measured>); 4] = [
         ("Least clearance, metres", |row| number(row.min_clearance_m)),
         ("Colliding edges", |row| {
             if row.found == 0 { "-".to_owned() } else { row.collisions.to_string() }
@@ -53,14 +56,15 @@ fn lengths(comparison: &Comparison) -> String {
     for method in Method::ALL {
         rows.push(measured(comparison, method, |row| number(row.length_m)));
     }
-    let paper: [(&str, fn(PaperFigures) -> f64); 3] = [
-        ("A* in the paper", |paper| paper.a_star_m),
-        ("RRT in the paper", |paper| paper.rrt_m),
-        ("QUAV in the paper", |paper| paper.quav_m),
+    let paper: [(&str, Figure<PaperFigures>); 3] = [
+        ("A* in the paper", |paper| number(Some(paper.a_star_m))),
+        ("RRT in the paper", |paper| number(Some(paper.rrt_m))),
+        ("QUAV in the paper", |paper| number(Some(paper.quav_m))),
     ];
     if scenarios.iter().any(|scenario| scenario.paper.is_some()) {
         for (label, figure) in paper {
-            rows.push(row(label, scenarios.iter().map(|s| number(s.paper.map(figure)))));
+            let cell = |s: &ScenarioResult| s.paper.as_ref().map_or_else(|| "-".to_owned(), figure);
+            rows.push(row(label, scenarios.iter().map(cell)));
         }
     }
     let note = "The paper's maps are not published; s1 to s6 resemble them, and its figures are \
@@ -68,7 +72,7 @@ fn lengths(comparison: &Comparison) -> String {
     named_table(comparison, note, &rows)
 }
 
-fn block(comparison: &Comparison, title: &str, value: fn(&Measured) -> String) -> String {
+fn block(comparison: &Comparison, title: &str, value: Figure<Measured>) -> String {
     let rows: Vec<_> =
         Method::ALL.into_iter().map(|method| measured(comparison, method, value)).collect();
     named_table(comparison, title, &rows)

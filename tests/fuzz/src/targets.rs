@@ -24,10 +24,10 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
 use tokio_util::sync::CancellationToken;
 
 /// A target by the name of its corpus.
-pub type Target = (&'static str, fn(&[u8]));
+pub(crate) type Target = (&'static str, fn(&[u8]));
 
 /// All of them.
-pub const ALL: [Target; 6] = [
+pub(crate) const ALL: [Target; 6] = [
     ("files", files),
     ("mission_items", mission_items),
     ("fence_items", fence_items),
@@ -37,7 +37,7 @@ pub const ALL: [Target; 6] = [
 ];
 
 /// Every file format, told apart by content as everywhere.
-pub fn files(data: &[u8]) {
+fn files(data: &[u8]) {
     let _ = read_fences("file", data);
     let _ = read_mission("file", data);
     let Ok(scenario) = read_scenario("file", data) else { return };
@@ -85,7 +85,7 @@ fn debug(value: &impl std::fmt::Debug) -> String {
 }
 
 /// A mission as a vehicle may hold it: 37 bytes for each item, as MISSION_ITEM_INT carries it.
-pub fn mission_items(data: &[u8]) {
+fn mission_items(data: &[u8]) {
     let Some((&which, rest)) = data.split_first() else { return };
     let items = items(rest);
     for (autopilot, habit) in [
@@ -115,7 +115,7 @@ fn judged(mission: &Mission, autopilot: Autopilot, which: u8) {
 }
 
 /// A fence as a vehicle may hold it.
-pub fn fence_items(data: &[u8]) {
+fn fence_items(data: &[u8]) {
     let Ok(decoded) = decode_fence(&items(data), None) else { return };
     let encoded = encode_fence(&decoded.fences).expect("what was decoded can be encoded");
     let again = decode_fence(&encoded, None).expect("what was encoded can be decoded").fences;
@@ -157,7 +157,7 @@ thread_local! {
 }
 
 /// A serial line with anything on it: raw bytes, and frames with valid checksums between them.
-pub fn frames(data: &[u8]) {
+fn frames(data: &[u8]) {
     RUNTIME.with_borrow(|runtime| {
         runtime.block_on(async {
             let line = parts(data).concat();
@@ -187,7 +187,7 @@ pub fn frames(data: &[u8]) {
 }
 
 /// A vehicle that answers a download with anything.
-pub fn download(data: &[u8]) {
+fn download(data: &[u8]) {
     RUNTIME.with_borrow(|runtime| {
         runtime.block_on(async {
             let answers = parts(data);
@@ -235,7 +235,7 @@ async fn answering(mut far: DuplexStream, answers: Vec<Vec<u8>>) {
 }
 
 /// What IBM's service says about a backend: its two documents with a zero byte between them.
-pub fn device(data: &[u8]) {
+fn device(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let (configuration, properties) = text.split_once('\0').unwrap_or((text, text));
     let Ok(device) = Device::parse(configuration, properties) else { return };
