@@ -14,11 +14,13 @@
 //! - [`baseline`]: A* and RRT, to compare with;
 //! - [`replan`]: a whole mission, and the judgement of any mission;
 //! - [`report`]: what is said and shown about it: JSON, a summary, a picture;
+//! - [`config`]: `quavd.toml`;
 //! - [`cli`]: the commands of `quavd`.
 
 pub mod airspace;
 pub mod baseline;
 pub mod cli;
+pub mod config;
 pub mod fence;
 pub mod formats;
 pub mod geodesy;

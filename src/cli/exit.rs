@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use crate::cli::files::FileError;
 use crate::cli::qaoa::QaoaCommandError;
+use crate::config::ConfigError;
 use crate::fence::items::FenceItemError;
 use crate::formats::FormatError;
 use crate::link::LinkError;
@@ -82,7 +83,7 @@ macro_rules! usage_errors {
     )*};
 }
 
-usage_errors!(FileError, FormatError, FenceItemError, QaoaCommandError, StoreError);
+usage_errors!(ConfigError, FileError, FormatError, FenceItemError, QaoaCommandError, StoreError);
 
 impl From<ReplanError> for CliError {
     fn from(error: ReplanError) -> Self {

@@ -4,7 +4,7 @@
 //! - [`options`]: what the commands have in common, with the names of the configuration file;
 //! - [`files`]: scenarios, missions and fences from files, results to files;
 //! - [`progress`]: what is shown while something runs;
-//! - [`plan`], [`check`], [`once`], [`compare`], [`qaoa`]: one command each;
+//! - [`run`], [`plan`], [`check`], [`once`], [`compare`], [`qaoa`]: one command each;
 //! - [`memory`]: what the machine has left;
 //! - [`exit`]: errors and their exit codes.
 
@@ -18,6 +18,7 @@ pub mod options;
 pub mod plan;
 pub mod progress;
 pub mod qaoa;
+pub mod run;
 
 use std::process::ExitCode;
 
@@ -41,6 +42,8 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// The daemon: stays with the vehicle, and plans when its mission or fence changes.
+    Run(run::RunArgs),
     /// Read from the vehicle, plan, upload, verify, exit.
     Once(once::OnceArgs),
     /// Plan a mission from files; no vehicle needed.
@@ -60,6 +63,7 @@ pub fn run(cli: Cli) -> ExitCode {
     start_log(cli.verbose, cli.quiet);
     let shown = progress::Shown::new(cli.quiet);
     let outcome = match cli.command {
+        Command::Run(args) => run::run(&args),
         Command::Once(args) => once::run(args, &shown),
         Command::Plan(args) => plan::run(&args, &shown),
         Command::Check(args) => check::run(&args, &shown),
