@@ -25,7 +25,7 @@ use crate::store::Store;
 use crate::vehicle::numbering::{to_mission, to_vehicle};
 use crate::vehicle::readback::differences;
 use crate::vehicle::replace::{Replacement, WhileArmed, pilots_own, replace, restore, settle};
-use crate::vehicle::{Autopilot, Vehicle, find};
+use crate::vehicle::{Autopilot, TransferError, Vehicle, find};
 
 /// How long to wait for the vehicle's home and position.
 const PLACE_PATIENCE: Duration = Duration::from_secs(5);
@@ -113,7 +113,8 @@ async fn with_vehicle(
     }
 
     let began = Instant::now();
-    let read = read(vehicle, store, &args.planning, shown).await?;
+    let held = Held::download(vehicle, shown).await?;
+    let read = read(vehicle, store, &args.planning, held, shown).await?;
     shown.warn(&read.scenario.warnings);
     let options = args.planning.options();
     if read.scenario.mission.items.is_empty() {
@@ -184,22 +185,41 @@ pub(crate) struct Read {
     pub(crate) autopilot: mission::Autopilot,
 }
 
+/// The three plans of a vehicle, as downloaded.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Held {
+    pub(crate) mission: Vec<MissionItem>,
+    pub(crate) fence: Vec<MissionItem>,
+    pub(crate) rally: Vec<MissionItem>,
+}
+
+impl Held {
+    /// Downloads all three.
+    pub(crate) async fn download(vehicle: &Vehicle, shown: &Shown) -> Result<Self, TransferError> {
+        let mut on_progress = |progress| shown.transfer(progress);
+        Ok(Self {
+            mission: vehicle.download(MissionType::Mission, &mut on_progress).await?.items,
+            fence: vehicle.download(MissionType::Fence, &mut on_progress).await?.items,
+            rally: vehicle.download(MissionType::Rally, &mut on_progress).await?.items,
+        })
+    }
+}
+
+/// What the plans of a vehicle mean, with what else planning starts from.
 pub(crate) async fn read(
     vehicle: &Vehicle,
     store: &Store,
     planning: &PlanningArgs,
+    held: Held,
     shown: &Shown,
 ) -> Result<Read, CliError> {
-    let mut on_progress = |progress| shown.transfer(progress);
-    let held = vehicle.download(MissionType::Mission, &mut on_progress).await?.items;
-    let fence = vehicle.download(MissionType::Fence, &mut on_progress).await?.items;
-    let rally = vehicle.download(MissionType::Rally, &mut on_progress).await?.items;
     shown.doing("waiting for the vehicle's home and position");
     let known =
         |state: &crate::vehicle::VehicleState| state.home.is_some() && state.position.is_some();
     let _ = vehicle.wait_for(PLACE_PATIENCE, known).await;
     let state = vehicle.state();
 
+    let Held { mission: held, fence, rally } = held;
     let original = pilots_own(vehicle, store, MissionType::Mission, &held).await?;
     let mission = to_mission(vehicle.autopilot(), &original, state.home);
     let decoded = decode_fence(&fence, None)?;
