@@ -83,7 +83,15 @@ macro_rules! usage_errors {
     )*};
 }
 
-usage_errors!(ConfigError, FileError, FormatError, FenceItemError, QaoaCommandError, StoreError);
+usage_errors!(
+    ConfigError,
+    FileError,
+    FormatError,
+    FenceItemError,
+    QaoaCommandError,
+    StoreError,
+    crate::link::SigningError
+);
 
 impl From<ReplanError> for CliError {
     fn from(error: ReplanError) -> Self {

@@ -1,8 +1,6 @@
 //! `quavd once`: read from the vehicle, plan, upload, verify, exit.
 
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::Args;
@@ -13,14 +11,16 @@ use super::files::{self, out_format};
 use super::options::{PlanningArgs, VehicleArgs};
 use super::plan::{Delivered, Outcome, planned_scenario};
 use super::progress::Shown;
+use super::signing::SigningArgs;
 use crate::fence::FenceSet;
 use crate::fence::items::decode_fence;
 use crate::formats::Scenario;
 use crate::geodesy::LatLon;
-use crate::link::{Endpoint, Link, Transport};
+use crate::link::{Endpoint, Link, Signer, Transport};
 use crate::mission::{self, Mission, MissionItem, MissionType};
 use crate::replan::{self, Input, Options, Replanned, replan};
 use crate::report::picture::picture;
+use crate::stop::Stop;
 use crate::store::Store;
 use crate::vehicle::numbering::{to_mission, to_vehicle};
 use crate::vehicle::readback::differences;
@@ -53,6 +53,9 @@ pub struct OnceArgs {
     /// .svg). May be repeated.
     #[arg(long, value_name = "FILE")]
     pub out: Vec<PathBuf>,
+    /// Who is believed.
+    #[command(flatten)]
+    pub signing: SigningArgs,
     /// How to plan.
     #[command(flatten)]
     pub planning: PlanningArgs,
@@ -74,7 +77,10 @@ pub fn run(args: OnceArgs, shown: &Shown) -> Result<String, CliError> {
     runtime.block_on(async {
         let cancel = CancellationToken::new();
         shown.doing(format!("connecting to {}", args.connect));
-        let transport = Transport::open(&args.connect).await?;
+        let mut transport = Transport::open(&args.connect).await?;
+        if let Some(settings) = args.signing.settings() {
+            transport = transport.signed(Signer::open(&settings, &args.vehicle.state_directory()?)?);
+        }
         let (link, task) = Link::start(transport, args.vehicle.identity(), cancel);
         let outcome = with_link(&args, &link, shown).await;
         shown.clear();
@@ -254,25 +260,24 @@ async fn plan_off_thread(
     options: &Options,
     shown: &Shown,
 ) -> Result<Replanned, CliError> {
-    let cancelled = Arc::new(AtomicBool::new(false));
+    let stop = Stop::new();
     let task = {
         let (mission, fences): (Mission, FenceSet) =
             (read.scenario.mission.clone(), read.scenario.fences.clone());
         let (rally, start, autopilot) = (read.rally.clone(), read.start, read.autopilot);
-        let (options, shown, cancelled) = (options.clone(), shown.clone(), Arc::clone(&cancelled));
+        let (options, shown, stop) = (options.clone(), shown.clone(), stop.clone());
         tokio::task::spawn_blocking(move || {
             let input =
                 Input { mission: &mission, fences: &fences, rally: &rally, start, autopilot };
-            let mut leg = String::new();
-            let watch = |progress: replan::Progress<'_>| shown.planning(&progress, &mut leg);
-            replan(&input, &options, &cancelled, watch)
+            let watch = |progress: replan::Progress<'_>| shown.planning(&progress);
+            replan(&input, &options, &stop, watch)
         })
     };
     tokio::pin!(task);
     let finished = tokio::select! {
         finished = &mut task => finished,
         _ = tokio::signal::ctrl_c() => {
-            cancelled.store(true, Ordering::Relaxed);
+            stop.cancel();
             task.await
         }
     };

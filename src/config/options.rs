@@ -9,6 +9,7 @@ use std::time::Duration;
 use clap::{ArgAction, Args};
 
 use crate::cli::options::{PlanningArgs, VehicleArgs};
+use crate::cli::signing::SigningArgs;
 use crate::link::Endpoint;
 
 /// `MAV_CMD_USER_1`; the others follow it.
@@ -25,6 +26,9 @@ pub struct DaemonOptions {
     /// Which vehicle, and who quavd is on it.
     #[command(flatten, next_help_heading = "Vehicle")]
     pub vehicle: VehicleArgs,
+    /// Who is believed.
+    #[command(flatten, next_help_heading = "Signing")]
+    pub signing: SigningArgs,
     /// When it works.
     #[command(flatten, next_help_heading = "Daemon")]
     pub service: ServiceArgs,
