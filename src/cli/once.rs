@@ -79,7 +79,8 @@ pub fn run(args: OnceArgs, shown: &Shown) -> Result<String, CliError> {
         shown.doing(format!("connecting to {}", args.connect));
         let mut transport = Transport::open(&args.connect).await?;
         if let Some(settings) = args.signing.settings() {
-            transport = transport.signed(Signer::open(&settings, &args.vehicle.state_directory()?)?);
+            transport =
+                transport.signed(Signer::open(&settings, &args.vehicle.state_directory()?)?);
         }
         let (link, task) = Link::start(transport, args.vehicle.identity(), cancel);
         let outcome = with_link(&args, &link, shown).await;

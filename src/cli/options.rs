@@ -113,22 +113,26 @@ impl VehicleArgs {
         }
     }
 
-    /// Where records are kept: the option (or systemd's `STATE_DIRECTORY`), else the user's state
-    /// directory.
+    /// Where records are kept.
     ///
     /// # Errors
-    /// [`CliError::Usage`] where there is neither.
+    /// [`CliError::Usage`] where no place is given and the user has no home.
     pub fn state_directory(&self) -> Result<PathBuf, CliError> {
-        if let Some(path) = &self.state_dir {
-            return Ok(path.clone());
-        }
-        let base = std::env::var_os("XDG_STATE_HOME")
-            .map(PathBuf::from)
-            .filter(|path| path.is_absolute())
-            .or_else(|| std::env::home_dir().map(|home| home.join(".local/state")));
-        base.map(|base| base.join("quavd"))
-            .ok_or_else(|| CliError::Usage("no place for records: give --state-dir DIR".to_owned()))
+        state_directory(self.state_dir.as_ref())
     }
+}
+
+/// The option (or systemd's `STATE_DIRECTORY`), else the user's state directory.
+pub(super) fn state_directory(chosen: Option<&PathBuf>) -> Result<PathBuf, CliError> {
+    if let Some(path) = chosen {
+        return Ok(path.clone());
+    }
+    let base = std::env::var_os("XDG_STATE_HOME")
+        .map(PathBuf::from)
+        .filter(|path| path.is_absolute())
+        .or_else(|| std::env::home_dir().map(|home| home.join(".local/state")));
+    base.map(|base| base.join("quavd"))
+        .ok_or_else(|| CliError::Usage("no place for records: give --state-dir DIR".to_owned()))
 }
 
 /// How to plan.

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::CliError;
-use crate::config::{self, reference};
+use crate::config::{Configuration, reference};
+use crate::daemon;
 
 /// The arguments of `quavd run`.
 #[derive(Debug, Args)]
@@ -29,10 +30,11 @@ pub fn run(args: &RunArgs) -> Result<String, CliError> {
     if args.example {
         return Ok(reference::example());
     }
-    let options = config::load(&args.config)?;
+    let configuration = Configuration::read(&args.config)?;
+    configuration.options()?;
     if args.check {
         return Ok(format!("{}: valid\n", args.config.display()));
     }
-    drop(options);
+    daemon::run(configuration)?;
     Ok(String::new())
 }

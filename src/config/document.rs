@@ -7,20 +7,24 @@ use std::path::{Path, PathBuf};
 use clap::builder::PossibleValue;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Arg, ArgAction, Command, FromArgMatches};
-use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::reference::{command, key_of};
-use super::{DaemonOptions, Problem};
+use super::{DaemonOptions, Overrides, Problem};
 
 /// Names that resemble each other at least this much are taken for a slip of the keyboard.
 const SIMILAR: f64 = 0.75;
 
-/// Reads a configuration. Relative paths are taken from `directory`.
+/// Reads a configuration. Relative paths are taken from `directory`; `overrides` count more than
+/// the text.
 ///
 /// # Errors
 /// Everything that is wrong with it.
-pub fn parse(text: &str, directory: &Path) -> Result<DaemonOptions, Vec<Problem>> {
+pub fn parse(
+    text: &str,
+    directory: &Path,
+    overrides: &Overrides,
+) -> Result<DaemonOptions, Vec<Problem>> {
     let table = DeTable::parse(text).map_err(|error| {
         let line = error.span().map(|span| line_at(text, span.start));
         vec![Problem { line, message: error.message().to_owned() }]
@@ -33,10 +37,12 @@ pub fn parse(text: &str, directory: &Path) -> Result<DaemonOptions, Vec<Problem>
     entries.sort_by_key(|(key, _)| key.span().start);
     for (key, value) in entries {
         let line = line_at(text, key.span().start);
-        match entry(&command, key.get_ref(), value, directory) {
-            Ok((arg, given)) => {
-                lines.push((arg.get_id().clone(), line));
-                arguments.extend(given);
+        match entry(&command, key.get_ref(), value.get_ref(), directory) {
+            Ok(given) => {
+                lines.push((key.get_ref().clone(), line));
+                if !overrides.contains_key(key.get_ref().as_ref()) {
+                    arguments.extend(given);
+                }
             }
             Err(message) => problems.push(Problem { line: Some(line), message }),
         }
@@ -44,7 +50,14 @@ pub fn parse(text: &str, directory: &Path) -> Result<DaemonOptions, Vec<Problem>
     if !problems.is_empty() {
         return Err(problems);
     }
-    let line_of = |id: &str| lines.iter().find(|(arg, _)| arg == id).map(|(_, line)| *line);
+    for (key, value) in overrides {
+        let value = DeValue::String(value.as_str().into());
+        match entry(&command, key, &value, directory) {
+            Ok(given) => arguments.extend(given),
+            Err(message) => return Err(vec![Problem { line: None, message }]),
+        }
+    }
+    let line_of = |key: &str| lines.iter().find(|(name, _)| name == key).map(|(_, line)| *line);
     let parsed = command
         .clone()
         .try_get_matches_from(arguments)
@@ -53,19 +66,19 @@ pub fn parse(text: &str, directory: &Path) -> Result<DaemonOptions, Vec<Problem>
 }
 
 /// One entry of the file as arguments, each tried by itself.
-fn entry<'c>(
-    command: &'c Command,
+fn entry(
+    command: &Command,
     key: &str,
-    value: &Spanned<DeValue<'_>>,
+    value: &DeValue<'_>,
     directory: &Path,
-) -> Result<(&'c Arg, Vec<String>), String> {
+) -> Result<Vec<String>, String> {
     let arg = command.get_arguments().find(|arg| key_of(arg).as_deref() == Some(key));
-    let arg = arg.ok_or_else(|| unknown(command, key, value.get_ref()))?;
+    let arg = arg.ok_or_else(|| unknown(command, key, value))?;
     let flag = format!("--{}", arg.get_long().unwrap_or_default());
     let is_switch = matches!(arg.get_action(), ArgAction::SetTrue);
-    let values = match value.get_ref() {
+    let values = match value {
         DeValue::Boolean(on) if is_switch => {
-            return Ok((arg, on.then_some(flag).into_iter().collect()));
+            return Ok(on.then_some(flag).into_iter().collect());
         }
         _ if is_switch => return Err(format!("{key} is either true or false")),
         DeValue::Array(values) if matches!(arg.get_action(), ArgAction::Append) => {
@@ -79,14 +92,16 @@ fn entry<'c>(
     for value in values {
         let value = if is_path { absolute(directory, &value) } else { value };
         let argument = format!("{flag}={value}");
-        // Nothing but this value: what else is missing is asked when all are together.
+        // Nothing but this value: what goes with what is asked when all are together.
         let alone = command.clone().mut_args(|arg| arg.required(false));
-        if let Err(error) = alone.try_get_matches_from([&argument]) {
+        if let Err(error) = alone.try_get_matches_from([&argument])
+            && error.kind() != ErrorKind::MissingRequiredArgument
+        {
             return Err(format!("{key}: {}", reason(&error)));
         }
         arguments.push(argument);
     }
-    Ok((arg, arguments))
+    Ok(arguments)
 }
 
 fn absolute(directory: &Path, value: &str) -> String {
@@ -185,13 +200,17 @@ mod tests {
     use crate::link::Endpoint;
 
     fn problems(text: &str) -> Vec<String> {
-        parse(text, Path::new("")).unwrap_err().iter().map(ToString::to_string).collect()
+        parse(text, Path::new(""), &Overrides::new())
+            .unwrap_err()
+            .iter()
+            .map(ToString::to_string)
+            .collect()
     }
 
     #[test]
     fn three_lines_are_a_configuration() {
         let text = "# the Pi's UART\nconnect = \"serial:/dev/ttyAMA0:921600\"\nbuffer = 8\n";
-        let options = parse(text, Path::new("/etc/quavd")).unwrap();
+        let options = parse(text, Path::new("/etc/quavd"), &Overrides::new()).unwrap();
         let serial = Endpoint::Serial { path: "/dev/ttyAMA0".to_owned(), baud: 921_600 };
         assert_eq!(options.connect, [serial]);
         assert!((options.planning.safety.buffer - 8.0).abs() < 1e-9);
@@ -211,7 +230,7 @@ mod tests {
             obstacles = ["city.geojson", "/srv/trees.kml"]
             debounce = 2
         "#;
-        let options = parse(text, Path::new("/etc/quavd")).unwrap();
+        let options = parse(text, Path::new("/etc/quavd"), &Overrides::new()).unwrap();
         assert_eq!(options.connect.len(), 2);
         assert_eq!(options.service.policy, Policy::OnCommand);
         assert!(!options.service.enable && options.planning.paper);
@@ -244,6 +263,17 @@ mod tests {
         let said = problems("connect = \"udpin:0.0.0.0:1\"\nqubits = 9\npaper = true\n");
         assert!(said[0].contains("paper") && said[0].contains("qubits"), "{said:?}");
         assert!(said[0].starts_with("line "), "{said:?}");
+    }
+
+    #[test]
+    fn what_is_set_over_the_file_counts_more_and_is_checked_alike() {
+        let text = "connect = \"udpin:0.0.0.0:1\"\nbuffer = 5\n";
+        let over = |value: &str| {
+            let overrides = [("buffer".to_owned(), value.to_owned())].into();
+            parse(text, Path::new(""), &overrides)
+        };
+        assert!((over("12.5").unwrap().planning.safety.buffer - 12.5).abs() < 1e-9);
+        assert!(over("-1").unwrap_err()[0].message.starts_with("buffer: "));
     }
 
     #[test]

@@ -9,6 +9,7 @@ pub mod document;
 pub mod options;
 pub mod reference;
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::fs::File;
 use std::io::{self, Read};
@@ -57,21 +58,58 @@ fn listed(path: &Path, problems: &[Problem]) -> String {
     problems.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
-/// Reads and validates a configuration file. Relative paths in it are relative to its directory.
-///
-/// # Errors
-/// [`ConfigError`], with everything that is wrong at once.
-pub fn load(path: &Path) -> Result<DaemonOptions, ConfigError> {
-    let failed = |source| ConfigError::Read { path: path.to_owned(), source };
-    let mut text = String::new();
-    let file = File::open(path).map_err(failed)?;
-    let read = file.take(LARGEST_FILE + 1).read_to_string(&mut text).map_err(failed)?;
-    if read as u64 > LARGEST_FILE {
-        return Err(failed(io::Error::other("it is larger than 1 MiB, so it is another file")));
+/// Keys with values that count more than those of the file.
+pub type Overrides = BTreeMap<String, String>;
+
+/// A configuration file as it was read, with what has been set over it since.
+#[derive(Debug, Clone)]
+pub struct Configuration {
+    path: PathBuf,
+    text: String,
+    overrides: Overrides,
+}
+
+impl Configuration {
+    /// Reads a file. Relative paths in it are relative to its directory.
+    ///
+    /// # Errors
+    /// [`ConfigError::Read`].
+    pub fn read(path: &Path) -> Result<Self, ConfigError> {
+        let failed = |source| ConfigError::Read { path: path.to_owned(), source };
+        let mut text = String::new();
+        let file = File::open(path).map_err(failed)?;
+        let read = file.take(LARGEST_FILE + 1).read_to_string(&mut text).map_err(failed)?;
+        if read as u64 > LARGEST_FILE {
+            return Err(failed(io::Error::other("it is larger than 1 MiB, so it is another file")));
+        }
+        Ok(Self { path: path.to_owned(), text, overrides: Overrides::new() })
     }
-    let directory = path.parent().unwrap_or(Path::new(""));
-    document::parse(&text, directory)
-        .map_err(|problems| ConfigError::Invalid { path: path.to_owned(), problems })
+
+    /// The file as it is now, validated, with the same values set over it.
+    ///
+    /// # Errors
+    /// [`ConfigError`]; then nothing has changed.
+    pub fn again(&self) -> Result<Self, ConfigError> {
+        let read = Self::read(&self.path)?.with(&self.overrides);
+        read.options()?;
+        Ok(read)
+    }
+
+    /// The same with these values in place of the file's.
+    #[must_use]
+    pub fn with(&self, overrides: &Overrides) -> Self {
+        Self { overrides: overrides.clone(), ..self.clone() }
+    }
+
+    /// What it says, as a whole.
+    ///
+    /// # Errors
+    /// [`ConfigError::Invalid`], with everything that is wrong at once.
+    pub fn options(&self) -> Result<DaemonOptions, ConfigError> {
+        let directory = self.path.parent().unwrap_or(Path::new(""));
+        document::parse(&self.text, directory, &self.overrides)
+            .map_err(|problems| ConfigError::Invalid { path: self.path.clone(), problems })
+    }
 }
 
 impl fmt::Display for Problem {

@@ -9,13 +9,15 @@ use super::document::names;
 use super::options::DaemonOptions;
 
 /// Values to show for options that have no default.
-const EXAMPLES: [(&str, &str); 6] = [
+const EXAMPLES: &[(&str, &str)] = &[
     ("connect", "serial:/dev/ttyAMA0:921600"),
     ("system", "1"),
     ("state_dir", "/var/lib/quavd"),
     ("socket", "/run/quavd/status.sock"),
     ("fence", "field.geojson"),
     ("obstacles", "buildings.kml"),
+    ("signing_key", "credential:signing-key"),
+    ("deadline", "10"),
 ];
 /// The width of comments in the example.
 const WIDTH: usize = 96;
@@ -151,7 +153,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::config::document::parse;
+    use crate::config::{Overrides, document};
 
     #[test]
     fn the_installed_example_is_what_the_options_say() {
@@ -167,14 +169,21 @@ mod tests {
     #[test]
     fn the_example_is_valid_as_it_is_and_line_by_line() {
         let directory = Path::new("/etc/quavd");
-        parse(&example(), directory).unwrap();
+        let parse = |text: &str| document::parse(text, directory, &Overrides::new());
+        parse(&example()).unwrap();
         let mut seen = 0;
         for line in example().lines().filter_map(|line| line.strip_prefix("# ")) {
             let Some((key, _)) = line.split_once(" = ") else { continue };
             if options().iter().any(|option| option.key == key) {
                 seen += 1;
-                let text = format!("connect = \"udpin:0.0.0.0:1\"\n{line}\n");
-                parse(&text, directory).unwrap_or_else(|problems| panic!("{line}: {problems:?}"));
+                // Options that only make sense with another one.
+                let key = if key.starts_with("signing_") && key != "signing_key" {
+                    "signing_key = \"credential:signing-key\"\n"
+                } else {
+                    ""
+                };
+                let text = format!("connect = \"udpin:0.0.0.0:1\"\n{key}{line}\n");
+                parse(&text).unwrap_or_else(|problems| panic!("{line}: {problems:?}"));
             }
         }
         assert_eq!(seen + 1, options().len());

@@ -14,7 +14,8 @@ use mavlink::{MavlinkVersion, MessageData};
 use super::id::{ComponentId, Node, SystemId};
 use crate::mission::{Command, Frame, MissionItem};
 
-pub use parameter::{ParamError, ParamName, ParamRequestRead, ParamValue};
+pub use command::{CommandAck, CommandInt, CommandLong};
+pub use parameter::{ParamError, ParamName, ParamRequestRead, ParamSet, ParamValue};
 
 /// Reads little-endian fields from a payload; what the sender truncated reads as zero.
 struct Fields<'a>(&'a [u8]);
@@ -79,6 +80,7 @@ macro_rules! message {
     };
 }
 
+mod command;
 mod parameter;
 
 /// Joins byte arrays into one of a known length.
@@ -335,7 +337,7 @@ impl MissionAck {
 message!(MissionAck, "MISSION_ACK", id 47, crc 153, length 8);
 
 /// MISSION_CURRENT (42): which item is flown.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MissionCurrent {
     /// The current item, in the vehicle's own numbering.
     pub seq: u16,
@@ -345,41 +347,39 @@ pub struct MissionCurrent {
     pub state: u8,
     /// 1 in mission mode, 2 suspended; 0 unknown.
     pub mode: u8,
+    /// The vehicle's fingerprint of its mission; 0 where it has none.
+    pub mission_id: u32,
+    /// That of its fence.
+    pub fence_id: u32,
+    /// That of its rally points.
+    pub rally_id: u32,
 }
 
 impl MissionCurrent {
     fn encode(&self) -> [u8; 18] {
-        joined(&[&self.seq.to_le_bytes(), &self.total.to_le_bytes(), &[self.state, self.mode]])
+        joined(&[
+            &self.seq.to_le_bytes(),
+            &self.total.to_le_bytes(),
+            &[self.state, self.mode],
+            &self.mission_id.to_le_bytes(),
+            &self.fence_id.to_le_bytes(),
+            &self.rally_id.to_le_bytes(),
+        ])
     }
 
     fn decode(fields: &Fields<'_>) -> Self {
-        Self { seq: fields.u16(0), total: fields.u16(2), state: fields.u8(4), mode: fields.u8(5) }
+        Self {
+            seq: fields.u16(0),
+            total: fields.u16(2),
+            state: fields.u8(4),
+            mode: fields.u8(5),
+            mission_id: fields.u32(6),
+            fence_id: fields.u32(10),
+            rally_id: fields.u32(14),
+        }
     }
 }
 message!(MissionCurrent, "MISSION_CURRENT", id 42, crc 28, length 18);
-
-/// COMMAND_ACK (77).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct CommandAck {
-    /// `MAV_CMD` that is answered.
-    pub command: u16,
-    /// `MAV_RESULT`; 0 is "accepted".
-    pub result: u8,
-    /// To whom; 0 in both where the firmware is old.
-    pub target: Node,
-}
-
-impl CommandAck {
-    fn encode(&self) -> [u8; 10] {
-        let target = [self.target.system.0, self.target.component.0];
-        joined(&[&self.command.to_le_bytes(), &[self.result, 0, 0, 0, 0, 0], &target])
-    }
-
-    fn decode(fields: &Fields<'_>) -> Self {
-        Self { command: fields.u16(0), result: fields.u8(2), target: fields.node(8) }
-    }
-}
-message!(CommandAck, "COMMAND_ACK", id 77, crc 143, length 10);
 
 /// STATUSTEXT (253): one chunk of a text for people.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -13,7 +13,7 @@ pub mod picture;
 pub mod run;
 pub mod stretch;
 pub mod summary;
-mod text;
+pub mod text;
 
 pub use run::Run;
 
