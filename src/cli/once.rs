@@ -22,6 +22,7 @@ use crate::replan::{self, Input, Options, Replanned, replan};
 use crate::report::picture::picture;
 use crate::stop::Stop;
 use crate::store::Store;
+use crate::vehicle::download::Downloaded;
 use crate::vehicle::numbering::{to_mission, to_vehicle};
 use crate::vehicle::readback::differences;
 use crate::vehicle::replace::{Replacement, WhileArmed, pilots_own, replace, restore, settle};
@@ -198,16 +199,23 @@ pub(crate) struct Held {
     pub(crate) mission: Vec<MissionItem>,
     pub(crate) fence: Vec<MissionItem>,
     pub(crate) rally: Vec<MissionItem>,
+    /// Which of them came in another way than was tried first, and why.
+    pub(crate) fell_back: Vec<String>,
 }
 
 impl Held {
     /// Downloads all three.
     pub(crate) async fn download(vehicle: &Vehicle, shown: &Shown) -> Result<Self, TransferError> {
         let mut on_progress = |progress| shown.transfer(progress);
+        let mission = vehicle.read_plan(MissionType::Mission, &mut on_progress).await?;
+        let fence = vehicle.read_plan(MissionType::Fence, &mut on_progress).await?;
+        let rally = vehicle.read_plan(MissionType::Rally, &mut on_progress).await?;
+        let fell_back = [&mission, &fence, &rally].into_iter().filter_map(Downloaded::fell_back);
         Ok(Self {
-            mission: vehicle.download(MissionType::Mission, &mut on_progress).await?.items,
-            fence: vehicle.download(MissionType::Fence, &mut on_progress).await?.items,
-            rally: vehicle.download(MissionType::Rally, &mut on_progress).await?.items,
+            fell_back: fell_back.collect(),
+            mission: mission.items,
+            fence: fence.items,
+            rally: rally.items,
         })
     }
 }
@@ -226,11 +234,12 @@ pub(crate) async fn read(
     let _ = vehicle.wait_for(PLACE_PATIENCE, known).await;
     let state = vehicle.state();
 
-    let Held { mission: held, fence, rally } = held;
+    let Held { mission: held, fence, rally, fell_back } = held;
     let original = pilots_own(vehicle, store, MissionType::Mission, &held).await?;
     let mission = to_mission(vehicle.autopilot(), &original, state.home);
     let decoded = decode_fence(&fence, None)?;
-    let (mut fences, mut warnings) = (decoded.fences, decoded.warnings);
+    let (mut fences, mut warnings) = (decoded.fences, fell_back);
+    warnings.extend(decoded.warnings);
     files::add_fences(&mut fences, &mut warnings, &planning.safety)?;
     let places = rally_places(&rally)?;
     // The vehicle stands at home before it takes off; in flight its own place counts.

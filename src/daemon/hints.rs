@@ -42,7 +42,7 @@ pub(super) enum Hint {
 pub(super) struct Hints {
     vehicle: Node,
     us: Node,
-    current: Option<[u32; 4]>,
+    current: Option<(u16, [u32; 3])>,
     parameters: BTreeMap<ParamName, u32>,
     uptime: Option<u32>,
 }
@@ -60,7 +60,7 @@ impl Hints {
         match frame.message_id() {
             MissionCurrent::ID => {
                 let now = frame.decode::<MissionCurrent>()?;
-                let now = [u32::from(now.total), now.mission_id, now.fence_id, now.rally_id];
+                let now = (now.total, now.plan_ids);
                 let before = self.current.replace(now)?;
                 (before != now).then_some(Hint::Changed("the vehicle counts another plan"))
             }
@@ -150,7 +150,7 @@ mod tests {
     }
 
     fn current(total: u16, seq: u16) -> MissionCurrent {
-        MissionCurrent { seq, total, ..MissionCurrent::default() }
+        MissionCurrent { seq, total, state: 0, mode: 0, plan_ids: [0; 3] }
     }
 
     fn text(words: &str) -> StatusText {
@@ -169,7 +169,7 @@ mod tests {
         );
         assert_eq!(hints.take(&frame(VEHICLE, &current(5, 3))), None);
         assert!(matches!(hints.take(&frame(VEHICLE, &current(6, 3))), Some(Hint::Changed(_))));
-        let id = MissionCurrent { fence_id: 9, ..current(6, 3) };
+        let id = MissionCurrent { plan_ids: [0, 9, 0], ..current(6, 3) };
         assert!(matches!(hints.take(&frame(VEHICLE, &id)), Some(Hint::Changed(_))));
     }
 

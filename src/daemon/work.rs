@@ -402,7 +402,7 @@ async fn after_upload(
     let mission = vehicle.download(MissionType::Mission, &mut |_| {}).await.ok()?.items;
     let autopilot = vehicle.autopilot();
     let is_ours = differences(autopilot, MissionType::Mission, intended, &mission).is_empty();
-    let held = Held { mission, fence: input.fence.clone(), rally: input.rally.clone() };
+    let held = Held { mission, ..input.clone() };
     is_ours.then(|| Fingerprint::of(autopilot, &held))
 }
 

@@ -15,6 +15,7 @@ use super::id::{ComponentId, Node, SystemId};
 use crate::mission::{Command, Frame, MissionItem};
 
 pub use command::{CommandAck, CommandInt, CommandLong};
+pub use file_transfer::FileTransfer;
 pub use parameter::{ParamError, ParamName, ParamRequestRead, ParamSet, ParamValue};
 
 /// Reads little-endian fields from a payload; what the sender truncated reads as zero.
@@ -81,6 +82,7 @@ macro_rules! message {
 }
 
 mod command;
+mod file_transfer;
 mod parameter;
 
 /// Joins byte arrays into one of a known length.
@@ -347,24 +349,16 @@ pub struct MissionCurrent {
     pub state: u8,
     /// 1 in mission mode, 2 suspended; 0 unknown.
     pub mode: u8,
-    /// The vehicle's fingerprint of its mission; 0 where it has none.
-    pub mission_id: u32,
-    /// That of its fence.
-    pub fence_id: u32,
-    /// That of its rally points.
-    pub rally_id: u32,
+    /// The vehicle's fingerprints of its mission, fence and rally points; 0 where it has none.
+    pub plan_ids: [u32; 3],
 }
 
 impl MissionCurrent {
     fn encode(&self) -> [u8; 18] {
-        joined(&[
-            &self.seq.to_le_bytes(),
-            &self.total.to_le_bytes(),
-            &[self.state, self.mode],
-            &self.mission_id.to_le_bytes(),
-            &self.fence_id.to_le_bytes(),
-            &self.rally_id.to_le_bytes(),
-        ])
+        let [mission, fence, rally] = self.plan_ids.map(u32::to_le_bytes);
+        let state = [self.state, self.mode];
+        let (seq, total) = (self.seq.to_le_bytes(), self.total.to_le_bytes());
+        joined(&[&seq, &total, &state, &mission, &fence, &rally])
     }
 
     fn decode(fields: &Fields<'_>) -> Self {
@@ -373,9 +367,7 @@ impl MissionCurrent {
             total: fields.u16(2),
             state: fields.u8(4),
             mode: fields.u8(5),
-            mission_id: fields.u32(6),
-            fence_id: fields.u32(10),
-            rally_id: fields.u32(14),
+            plan_ids: [fields.u32(6), fields.u32(10), fields.u32(14)],
         }
     }
 }

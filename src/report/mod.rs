@@ -18,4 +18,4 @@ pub mod text;
 pub use run::Run;
 
 #[cfg(test)]
-mod samples;
+pub(crate) mod samples;

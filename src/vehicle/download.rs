@@ -26,6 +26,36 @@ pub struct Downloaded {
     pub items: Vec<MissionItem>,
     /// The vehicle's fingerprint of the plan; 0 where it has none (ArduPilot).
     pub opaque_id: u32,
+    /// How it came.
+    pub source: Source,
+}
+
+impl Downloaded {
+    /// What to tell the user where the vehicle offers files and a file could not be had.
+    #[must_use]
+    pub fn fell_back(&self) -> Option<String> {
+        match &self.source {
+            Source::MissionProtocol { ftp_failed: Some(reason) } => {
+                Some(format!("read item by item, since MAVLink FTP failed for the {reason}"))
+            }
+            _ => None,
+        }
+    }
+}
+
+/// The way a plan came.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Source {
+    /// Item by item.
+    MissionProtocol {
+        /// Why not as a file, where the vehicle offers files.
+        ftp_failed: Option<String>,
+    },
+    /// As a file over MAVLink FTP, held against the vehicle's own checksum.
+    File {
+        /// That checksum.
+        crc32: u32,
+    },
 }
 
 impl Vehicle {
@@ -42,7 +72,8 @@ impl Vehicle {
         let mut restarts = 0;
         loop {
             let mut exchange = Exchange::new(self, mission_type)?;
-            match attempt(&mut exchange, on_progress).await {
+            let widest = if restarts == 0 { widest_window(self.autopilot) } else { 1 };
+            match attempt(&mut exchange, widest, on_progress).await {
                 Ok(plan) => {
                     tracing::debug!(plan = %mission_type, items = plan.items.len(), "downloaded");
                     return Ok(plan);
@@ -61,6 +92,7 @@ impl Vehicle {
 
 async fn attempt(
     exchange: &mut Exchange<'_>,
+    widest: usize,
     on_progress: OnProgress<'_>,
 ) -> Result<Downloaded, Setback> {
     let (count, opaque_id) = count(exchange).await?;
@@ -68,7 +100,7 @@ async fn attempt(
     let total = usize::from(count);
     let mut tell = |done| on_progress(Progress { direction, mission_type, done, total });
     tell(0);
-    let items = items(exchange, count, &mut tell).await?;
+    let items = items(exchange, count, widest, &mut tell).await?;
     // Without this the vehicle would keep the transfer open until its own time-out.
     let ack = MissionAck {
         target: exchange.target(),
@@ -77,7 +109,8 @@ async fn attempt(
         opaque_id: 0,
     };
     exchange.send(&ack).await?;
-    Ok(Downloaded { items, opaque_id })
+    let source = Source::MissionProtocol { ftp_failed: None };
+    Ok(Downloaded { items, opaque_id, source })
 }
 
 /// MISSION_REQUEST_LIST until there is a MISSION_COUNT.
@@ -138,22 +171,38 @@ fn is_refusal(result: MissionResult) -> bool {
     )
 }
 
+/// Answers to later requests after which a request counts as lost: fewer could be a line that
+/// changes the order (TCP's rule, RFC 5681, section 3.2).
+const OVERTAKEN: u32 = 3;
+
 /// One request under way.
 struct Asked {
     at: Instant,
     again: bool,
+    /// How many requests that were made later have been answered.
+    overtaken: u32,
 }
 
-/// MISSION_REQUEST_INT for each item, until all are there.
-///
-/// PX4 keeps a cursor and ends the transfer over a request out of turn, so the window is one
-/// unless the autopilot is known to answer in any order; it grows while nothing is lost.
+impl Asked {
+    fn now(again: bool) -> Self {
+        Self { at: Instant::now(), again, overtaken: 0 }
+    }
+}
+
+/// PX4 keeps a cursor and ends the transfer over a request out of turn, so one request is under way
+/// at a time unless the autopilot is known to answer in any order.
+fn widest_window(autopilot: Autopilot) -> usize {
+    if autopilot == Autopilot::ArduPilot { WIDEST_WINDOW } else { 1 }
+}
+
+/// MISSION_REQUEST_INT for each item, until all are there. The window grows up to `widest` with each
+/// answer and is halved when the line falls quiet; a transfer that is begun again has one of one.
 async fn items(
     exchange: &mut Exchange<'_>,
     count: u16,
+    widest: usize,
     tell: &mut (dyn FnMut(usize) + Send),
 ) -> Result<Vec<MissionItem>, Setback> {
-    let widest = if exchange.vehicle.autopilot == Autopilot::ArduPilot { WIDEST_WINDOW } else { 1 };
     let mut window = 1;
     let mut held: BTreeMap<u16, MissionItem> = BTreeMap::new();
     let mut asked: BTreeMap<u16, Asked> = BTreeMap::new();
@@ -162,7 +211,7 @@ async fn items(
     while held.len() < usize::from(count) {
         while asked.len() < window && next < count {
             request(exchange, next).await?;
-            asked.insert(next, Asked { at: Instant::now(), again: false });
+            asked.insert(next, Asked::now(false));
             next += 1;
         }
         let wait = exchange.round_trip.item_wait(exchange.timing());
@@ -178,6 +227,7 @@ async fn items(
                 held.insert(item.seq, item);
                 patience.renew();
                 tell(held.len());
+                ask_overtaken(exchange, &mut asked, request.at).await?;
             }
             // PX4 lost the thread, or the plan is shorter than was announced.
             Some(Heard::Ack { result, .. })
@@ -210,7 +260,24 @@ async fn ask_overdue(
     for (&seq, request_made) in asked.iter_mut() {
         if request_made.at.elapsed() >= wait {
             request(exchange, seq).await?;
-            *request_made = Asked { at: Instant::now(), again: true };
+            *request_made = Asked::now(true);
+        }
+    }
+    Ok(())
+}
+
+/// The autopilot answers in the order of the requests, so one that later ones overtook was lost, or
+/// its answer: no need to wait for the end of its time.
+async fn ask_overtaken(
+    exchange: &Exchange<'_>,
+    asked: &mut BTreeMap<u16, Asked>,
+    answered: Instant,
+) -> Result<(), TransferError> {
+    for (&seq, earlier) in asked.iter_mut().filter(|(_, earlier)| earlier.at < answered) {
+        earlier.overtaken += 1;
+        if earlier.overtaken >= OVERTAKEN {
+            request(exchange, seq).await?;
+            *earlier = Asked::now(true);
         }
     }
     Ok(())

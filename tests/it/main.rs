@@ -11,6 +11,7 @@ mod daemon;
 mod deadline;
 mod packaging;
 mod parameters;
+mod plan_files;
 mod replacing;
 mod scenes;
 mod security;

@@ -192,6 +192,26 @@ async fn after_the_first_heartbeat_other_addresses_are_not_heard() {
     session.close().await;
 }
 
+#[tokio::test]
+async fn a_vehicle_that_comes_back_under_another_address_is_found_there() {
+    let port = free_port();
+    let listen: Endpoint = format!("udpin:127.0.0.1:{port}").parse().unwrap();
+    let transport = Transport::open(&listen).await.unwrap();
+    let to = format!("udpout:127.0.0.1:{port}");
+    let fake = FakeVehicle::start_on(&to, &[]);
+    let session = Session::over(transport, &search()).await.unwrap();
+    drop(fake);
+    let begun = tokio::time::Instant::now();
+    // Its socket, and with it its port, is another one.
+    let mut fake = FakeVehicle::start_on(&to, &[]);
+    fake.set(MISSION, &(0..5).map(waypoint).collect::<Vec<_>>());
+    let back = session.vehicle.wait_for(Duration::from_secs(30), |s| s.heartbeat_at > begun).await;
+    assert!(back.is_some());
+    let held = session.vehicle.download(MISSION, &mut |_| {}).await.unwrap().items;
+    assert_eq!(held.len(), fake.held(MISSION).len());
+    session.close().await;
+}
+
 fn free_port() -> u16 {
     UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }
