@@ -104,6 +104,8 @@ class Ftp:
                 answer.send(ACK, content, offset)
             else:
                 answer.send(NAK, bytes([END_OF_FILE]), offset)
+        elif opcode == BURST:
+            self._burst(session, offset, size or MOST_DATA, answer)
         elif opcode == CRC32:
             mission_type = FILES.get(data[:size].rstrip(b"\0"))
             if mission_type is None:
@@ -114,6 +116,19 @@ class Ftp:
                 answer.send(ACK, struct.pack("<I", crc))
         else:
             answer.send(NAK, bytes([UNKNOWN_COMMAND]))
+
+    def _burst(self, session, offset, size, answer):
+        """All that follows, piece by piece, and the end of the file."""
+        if session.mission_type is None or size > MOST_DATA:
+            answer.send(NAK, bytes([NO_FILE if size <= MOST_DATA else WRONG_SIZE]))
+            return
+        content = self._file(session.mission_type, asked=range(offset, CLAIMED_SIZE))
+        for at in range(offset, len(content), size):
+            piece = content[at:at + size]
+            self._read_events(session.mission_type, at, len(piece))
+            answer.send(ACK, piece, at)
+            answer.seq += 1
+        answer.send(NAK, bytes([END_OF_FILE]), max(offset, len(content)))
 
     def _read_events(self, mission_type, offset, length):
         """For the faults that strike after an item went through."""

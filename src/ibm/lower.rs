@@ -168,7 +168,11 @@ fn gates(
 
 /// What the circuit asks of each place of a line, found by lowering it for four imaginary lines that
 /// show every pair of directions at every qubit.
-fn demand(native: Native, chain: &ChainIsing, binding: Binding<'_>) -> Result<Demand, LowerError> {
+pub(super) fn demand(
+    native: Native,
+    chain: &ChainIsing,
+    binding: Binding<'_>,
+) -> Result<Demand, LowerError> {
     let qubits = chain.qubits();
     let bonds = qubits - 1;
     let mut demand = Demand { bonds: vec![0; bonds], pulses: vec![[[0; 2]; 2]; qubits] };
@@ -200,3 +204,6 @@ fn demand(native: Native, chain: &ChainIsing, binding: Binding<'_>) -> Result<De
     }
     Ok(demand)
 }
+
+#[cfg(test)]
+mod tests;

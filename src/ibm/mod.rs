@@ -13,6 +13,8 @@ pub mod line;
 pub mod lower;
 pub mod metrics;
 mod qasm;
+#[cfg(test)]
+mod samples;
 mod segments;
 #[cfg(test)]
 mod simulate;

@@ -54,3 +54,42 @@ pub(super) fn segments(qubits: usize) -> Vec<Bond> {
     bonds.extend(joins);
     bonds
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Steps of two-qubit gates until everything is done, or `None` if the order cannot be followed.
+    fn depth(qubits: usize) -> Option<usize> {
+        let mut touched = vec![0; qubits];
+        let mut bonds = vec![false; qubits.saturating_sub(1)];
+        for bond in segments(qubits) {
+            let (at, steps) = match bond {
+                Bond::Seed(at) if touched[at] == 0 && touched[at + 1] == 0 => (at, 1),
+                Bond::Grow { bond, from, to } if touched[from] > 0 && touched[to] == 0 => (bond, 1),
+                Bond::Join(at) => (at, 2),
+                _ => return None,
+            };
+            let done = touched[at].max(touched[at + 1]) + steps;
+            (touched[at], touched[at + 1]) = (done, done);
+            assert!(!std::mem::replace(&mut bonds[at], true));
+        }
+        assert!(bonds.into_iter().all(|done| done));
+        touched.into_iter().max()
+    }
+
+    #[test]
+    fn every_bond_is_made_once_within_four_steps() {
+        for qubits in 1..200 {
+            assert!(depth(qubits).is_some_and(|depth| depth <= 4), "{qubits}");
+        }
+    }
+
+    #[test]
+    fn joins_are_few() {
+        let joins = |qubits| {
+            segments(qubits).into_iter().filter(|bond| matches!(bond, Bond::Join(_))).count()
+        };
+        assert_eq!([8, 9, 12, 13, 20, 21].map(joins), [0, 1, 1, 2, 3, 4]);
+    }
+}

@@ -358,3 +358,6 @@ fn without_infinities(text: &str) -> Cow<'_, str> {
     }
     Cow::Owned(clean)
 }
+
+#[cfg(test)]
+mod tests;

@@ -178,14 +178,59 @@ const OVERTAKEN: u32 = 3;
 /// One request under way.
 struct Asked {
     at: Instant,
+    /// Its place among all requests of the transfer.
+    turn: u64,
     again: bool,
     /// How many requests that were made later have been answered.
     overtaken: u32,
 }
 
-impl Asked {
-    fn now(again: bool) -> Self {
-        Self { at: Instant::now(), again, overtaken: 0 }
+/// Requests under way, by item.
+#[derive(Default)]
+struct UnderWay {
+    requests: BTreeMap<u16, Asked>,
+    turns: u64,
+}
+
+impl UnderWay {
+    async fn ask(
+        &mut self,
+        exchange: &Exchange<'_>,
+        seq: u16,
+        again: bool,
+    ) -> Result<(), TransferError> {
+        let (target, mission_type) = (exchange.target(), exchange.wire_type());
+        exchange.send(&MissionRequestInt { seq, target, mission_type }).await?;
+        self.turns += 1;
+        let asked = Asked { at: Instant::now(), turn: self.turns, again, overtaken: 0 };
+        self.requests.insert(seq, asked);
+        Ok(())
+    }
+
+    /// When the oldest request was made.
+    fn oldest(&self) -> Instant {
+        self.requests.values().map(|asked| asked.at).min().unwrap_or_else(Instant::now)
+    }
+
+    /// Those that have waited long enough.
+    fn overdue(&self, wait: Duration) -> Vec<u16> {
+        let overdue = |(&seq, asked): (&u16, &Asked)| (asked.at.elapsed() >= wait).then_some(seq);
+        self.requests.iter().filter_map(overdue).collect()
+    }
+
+    /// Those that are lost now that a later one was answered. The autopilot answers in the order of
+    /// the requests: no need to wait for the end of their time.
+    fn overtaken_by(&mut self, answered: &Asked) -> Vec<u16> {
+        let mut lost = Vec::new();
+        for (&seq, earlier) in &mut self.requests {
+            if earlier.turn < answered.turn {
+                earlier.overtaken += 1;
+                if earlier.overtaken >= OVERTAKEN {
+                    lost.push(seq);
+                }
+            }
+        }
+        lost
     }
 }
 
@@ -205,21 +250,19 @@ async fn items(
 ) -> Result<Vec<MissionItem>, Setback> {
     let mut window = 1;
     let mut held: BTreeMap<u16, MissionItem> = BTreeMap::new();
-    let mut asked: BTreeMap<u16, Asked> = BTreeMap::new();
+    let mut under_way = UnderWay::default();
     let mut next = 0;
     let mut patience = Patience::new();
     while held.len() < usize::from(count) {
-        while asked.len() < window && next < count {
-            request(exchange, next).await?;
-            asked.insert(next, Asked::now(false));
+        while under_way.requests.len() < window && next < count {
+            under_way.ask(exchange, next, false).await?;
             next += 1;
         }
         let wait = exchange.round_trip.item_wait(exchange.timing());
-        let oldest = asked.values().map(|asked| asked.at).min().unwrap_or_else(Instant::now);
-        match exchange.next_before(oldest + wait).await? {
+        match exchange.next_before(under_way.oldest() + wait).await? {
             Some(Heard::Item(item)) => {
                 // Another seq than one that is wanted: a repeat, or somebody's mistake.
-                let Some(request) = asked.remove(&item.seq) else { continue };
+                let Some(request) = under_way.requests.remove(&item.seq) else { continue };
                 if !request.again {
                     exchange.round_trip.measured(request.at.elapsed());
                     window = (window + 1).min(widest);
@@ -227,7 +270,9 @@ async fn items(
                 held.insert(item.seq, item);
                 patience.renew();
                 tell(held.len());
-                ask_overtaken(exchange, &mut asked, request.at).await?;
+                for seq in under_way.overtaken_by(&request) {
+                    under_way.ask(exchange, seq, true).await?;
+                }
             }
             // PX4 lost the thread, or the plan is shorter than was announced.
             Some(Heard::Ack { result, .. })
@@ -240,50 +285,16 @@ async fn items(
             Some(_) => {}
             None => {
                 window = (window / 2).max(1);
-                let waiting = asked.keys().next().copied().unwrap_or(next);
+                let waiting = under_way.requests.keys().next().copied().unwrap_or(next);
                 if exchange.is_hopeless(&mut patience) {
                     let error = exchange.no_answer(Awaited::Item(waiting), patience.waited());
                     return Err(Setback::Again(error));
                 }
-                ask_overdue(exchange, &mut asked, wait).await?;
+                for seq in under_way.overdue(wait) {
+                    under_way.ask(exchange, seq, true).await?;
+                }
             }
         }
     }
     Ok(held.into_values().collect())
-}
-
-async fn ask_overdue(
-    exchange: &Exchange<'_>,
-    asked: &mut BTreeMap<u16, Asked>,
-    wait: Duration,
-) -> Result<(), TransferError> {
-    for (&seq, request_made) in asked.iter_mut() {
-        if request_made.at.elapsed() >= wait {
-            request(exchange, seq).await?;
-            *request_made = Asked::now(true);
-        }
-    }
-    Ok(())
-}
-
-/// The autopilot answers in the order of the requests, so one that later ones overtook was lost, or
-/// its answer: no need to wait for the end of its time.
-async fn ask_overtaken(
-    exchange: &Exchange<'_>,
-    asked: &mut BTreeMap<u16, Asked>,
-    answered: Instant,
-) -> Result<(), TransferError> {
-    for (&seq, earlier) in asked.iter_mut().filter(|(_, earlier)| earlier.at < answered) {
-        earlier.overtaken += 1;
-        if earlier.overtaken >= OVERTAKEN {
-            request(exchange, seq).await?;
-            *earlier = Asked::now(true);
-        }
-    }
-    Ok(())
-}
-
-async fn request(exchange: &Exchange<'_>, seq: u16) -> Result<(), TransferError> {
-    let (target, mission_type) = (exchange.target(), exchange.wire_type());
-    exchange.send(&MissionRequestInt { seq, target, mission_type }).await
 }

@@ -9,6 +9,7 @@ mod commands;
 mod compare;
 mod daemon;
 mod deadline;
+mod ibm_circuits;
 mod packaging;
 mod parameters;
 mod plan_files;

@@ -221,10 +221,10 @@ async fn an_item_that_later_ones_overtook_is_asked_for_at_once() {
     let (vehicle, mut peer, _task) = scene(ARDUPILOT).await;
     let (held, begun) = tokio::join!(download(&vehicle), async {
         peer.hears::<MissionRequestList>().await;
-        peer.say(&count(40)).await;
+        peer.say(&count(80)).await;
         let begun = Instant::now();
-        // Item 20 is lost twice, its requests among others.
-        let (mut lost, mut missing) = (0, 40);
+        // The request for item 20 is lost twice; enough others follow each time.
+        let (mut lost, mut missing) = (0, 80);
         while missing > 0 {
             let request: MissionRequestInt = peer.hears().await;
             tokio::time::advance(Duration::from_millis(1)).await;
@@ -237,7 +237,7 @@ async fn an_item_that_later_ones_overtook_is_asked_for_at_once() {
         }
         begun
     });
-    assert_eq!(held.unwrap(), items(40));
+    assert_eq!(held.unwrap(), items(80));
     let waited = begun.elapsed();
     assert!(waited < vehicle.timing.item_min, "waited for a time-out: {waited:?}");
 }
