@@ -16,7 +16,7 @@
 //! - [`stop`]: calling all of that off, and its deadline;
 //! - [`replan`]: a whole mission, and the judgement of any mission;
 //! - [`report`]: what is said and shown about it: JSON, a summary, a picture;
-//! - [`config`]: `quavd.toml`;
+//! - [`config`]: the configuration file `quavd.toml`;
 //! - [`daemon`]: staying with a vehicle, and planning when its plans change;
 //! - [`cli`]: the commands of `quavd`.
 

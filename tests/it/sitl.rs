@@ -101,9 +101,10 @@ impl FakeVehicle {
         let mut dump = tempfile::NamedTempFile::new().unwrap();
         write!(dump, "{}", self.dump()).unwrap();
         let judge = Path::new(env!("CARGO_MANIFEST_DIR")).join("sitl/judge.py");
-        let output = Command::new(python()).arg(judge).arg(dump.path()).output().unwrap();
-        serde_json::from_slice(&output.stdout)
-            .unwrap_or_else(|_| panic!("{}", String::from_utf8_lossy(&output.stderr)))
+        let mut command = Command::new(python());
+        let output = command.arg(judge).arg(dump.path()).stderr(Stdio::inherit()).output();
+        serde_json::from_slice(&output.unwrap().stdout)
+            .expect("a verdict; without one, the reason is on stderr above")
     }
 
     /// The items of one plan that the vehicle holds.
