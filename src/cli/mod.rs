@@ -5,7 +5,8 @@
 //! - [`signing`]: the options that sign a link;
 //! - [`files`]: scenarios, missions and fences from files, results to files;
 //! - [`progress`]: what is shown while something runs;
-//! - [`run`], [`status`], [`plan`], [`check`], [`once`], [`compare`], [`qaoa`]: one command each;
+//! - [`run`], [`status`], [`plan`], [`check`], [`once`], [`compare`], [`qaoa`], [`ibm`]: one command
+//!   each;
 //! - [`generate`]: manual pages and completions;
 //! - [`memory`]: what the machine has left;
 //! - [`exit`]: errors and their exit codes.
@@ -15,6 +16,7 @@ pub mod compare;
 pub mod exit;
 pub mod files;
 pub mod generate;
+pub mod ibm;
 pub mod memory;
 pub mod once;
 pub mod options;
@@ -63,6 +65,8 @@ enum Command {
     Compare(compare::CompareArgs),
     /// Run QAOA alone on an Ising problem.
     Qaoa(qaoa::QaoaArgs),
+    /// What the QPU path sees, chooses and sends.
+    Ibm(ibm::IbmCommand),
     /// Write manual pages, completions and the example configuration for a package.
     #[command(hide = true)]
     Generate(generate::GenerateArgs),
@@ -83,6 +87,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Check(args) => check::run(&args, &shown),
         Command::Compare(args) => compare::run(&args, &shown),
         Command::Qaoa(args) => qaoa::run(&args).map_err(CliError::from),
+        Command::Ibm(command) => ibm::run(&command),
         Command::Generate(args) => generate::run(&args),
     };
     match outcome {

@@ -27,6 +27,8 @@ pub(super) enum Verdict {
     NoPath,
     /// The input or a setting cannot be used; the mission is untouched.
     BadInput,
+    /// The QPU failed and nothing else was allowed.
+    Qpu,
     /// The vehicle is armed.
     Armed,
     /// The vehicle said no.
@@ -143,6 +145,7 @@ impl Answer {
         let (verdict, words) = match error {
             CliError::Usage(_) => (Verdict::BadInput, "cannot plan, mission untouched"),
             CliError::NoPath { .. } => (Verdict::NoPath, "no safe path, mission untouched"),
+            CliError::Qpu(_) => (Verdict::Qpu, "the QPU failed, mission untouched"),
             CliError::Unreachable(_) => (Verdict::Unreachable, "vehicle does not answer"),
             CliError::Refused(_) => (Verdict::Refused, "vehicle refused, mission untouched"),
         };

@@ -14,10 +14,12 @@ use tokio::task::JoinHandle;
 use super::answer::{Answer, Verdict};
 use crate::cli::CliError;
 use crate::cli::once::{Held, Read, read};
+use crate::cli::options::as_qpu;
 use crate::cli::progress::Shown;
 use crate::config::DaemonOptions;
+use crate::ibm::qpu::IbmQpu;
 use crate::mission::{MissionItem, MissionType};
-use crate::replan::{Input, Options, ReplanError, Replanned, Stage, replan};
+use crate::replan::{Input, Options, ReplanError, Replanned, Stage, replan_with};
 use crate::report::Run;
 use crate::report::json::PlanDocument;
 use crate::report::picture::picture;
@@ -29,6 +31,9 @@ use crate::vehicle::replace::{
     Obstacle, ReplaceError, Replacement, Step, WhileArmed, replace, settle,
 };
 use crate::vehicle::{Autopilot, Vehicle};
+
+/// A vehicle does not wait longer for a QPU's queue, unless the configuration sets a deadline.
+const LONGEST_QUEUE: Duration = Duration::from_secs(60);
 
 /// What a vehicle holds, as a number that differs where the plans differ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -251,9 +256,14 @@ async fn work(
     let read = read.map_err(|error| known(Answer::from_cli(error)))?;
     let load = began.elapsed();
 
-    let planning = options.planning.options();
+    let mut planning = options.planning.options();
+    let qpu = options.planning.qpu(options.vehicle.state_dir.as_ref());
+    let qpu = qpu.map_err(|error| known(Answer::from_cli(error)))?;
+    if qpu.is_some() {
+        planning.deadline.get_or_insert(LONGEST_QUEUE);
+    }
     let input = held;
-    let (read, planned) = plan(read, planning.clone(), gate, phase).await.map_err(known)?;
+    let (read, planned) = plan(read, planning.clone(), qpu, gate, phase).await.map_err(known)?;
     let run =
         Run { options: &planning, warnings: &read.scenario.warnings, load, total: began.elapsed() };
     let planned = match planned {
@@ -317,6 +327,7 @@ fn tell(phase: &watch::Sender<Phase>, step: Step) {
 async fn plan(
     read: Read,
     options: Options,
+    mut qpu: Option<IbmQpu>,
     gate: &Gate,
     phase: &watch::Sender<Phase>,
 ) -> Result<(Read, Result<Replanned, ReplanError>), Box<Answer>> {
@@ -330,7 +341,7 @@ async fn plan(
             start: read.start,
             autopilot: read.autopilot,
         };
-        let planned = replan(&input, &options, &stop, |progress| {
+        let planned = replan_with(&input, &options, as_qpu(&mut qpu), &stop, |progress| {
             let done = match progress.stage {
                 Stage::Candidates => progress.leg.saturating_sub(1) as f32,
                 Stage::Round { .. } => progress.leg as f32 - 0.5,
