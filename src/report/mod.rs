@@ -17,10 +17,10 @@ pub mod picture;
 pub mod run;
 pub mod stretch;
 pub mod summary;
-mod text;
+pub mod text;
 
 pub use files::{Report, ReportError};
 pub use run::Run;
 
 #[cfg(test)]
-mod samples;
+pub(crate) mod samples;
