@@ -244,3 +244,15 @@ fn is_pieced(flat: &str, part: &str) -> bool {
         before.len() > 5 && flat.contains(&before) && (after.is_empty() || flat.contains(&after))
     })
 }
+
+#[test]
+fn configurations_in_the_pages_are_valid() {
+    let directory = directory();
+    let mut checked = 0;
+    for block in blocks().iter().filter(|block| block.kind == "toml") {
+        std::fs::write(directory.path().join("quavd.toml"), &block.text).unwrap();
+        assert_ends(block, &shell(&directory, "quavd run --config quavd.toml --check"), 0);
+        checked += 1;
+    }
+    assert!(checked > 0);
+}

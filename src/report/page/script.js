@@ -34,8 +34,9 @@
     x = Math.min(Math.max(x, -home.w * zoom), home.w);
     y = Math.min(Math.max(y, -home.h * zoom), home.h);
     world.setAttribute("transform", `translate(${x} ${y}) scale(${zoom})`);
-    map.style.setProperty("--inverse", 1 / zoom);
     const pixels = Math.min(map.clientWidth / home.w, map.clientHeight / home.h) || 1;
+    // Marks keep their size while zooming, and are nearly as large on a phone.
+    map.style.setProperty("--inverse", 1 / (zoom * Math.min(1, pixels ** 0.7)));
     const perMetre = unitsPerMetre * zoom * pixels;
     const most = Math.min(120, map.clientWidth / 3) / perMetre;
     const decade = 10 ** Math.floor(Math.log10(most));

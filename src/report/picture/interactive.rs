@@ -35,7 +35,7 @@ pub(in crate::report) struct InteractiveMap<'a> {
     /// Whether there are candidates over corners, and over the grid.
     pub(in crate::report) corners: bool,
     pub(in crate::report) grid: bool,
-    /// Whether there are obstacles, and areas to stay inside.
+    /// Whether there are obstacles, and whether any of what inclusions forbid is in sight at first.
     pub(in crate::report) obstacles: bool,
     pub(in crate::report) inclusions: bool,
     /// Zones with legs that are not on the map.
@@ -92,7 +92,7 @@ pub(in crate::report) fn interactive<'a>(
         corners,
         grid,
         obstacles: scene.outlines.iter().any(is_solid),
-        inclusions: scene.outlines.iter().any(|outline| !is_solid(outline)),
+        inclusions: map::shows_outside(&scene, &shown),
         other_zones: subject.fields.len().saturating_sub(1),
         records: scene.records,
     })
