@@ -80,7 +80,8 @@ pub struct PlanningArgs {
     /// Distances and fences.
     #[command(flatten)]
     pub safety: SafetyArgs,
-    /// Edges of a leg's path, one qubit each; legs with more corners get more.
+    /// Edges of a leg's path, one qubit each. Legs with more corners get more; engines other than
+    /// chain then take them in windows of this many qubits.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u16).range(2..=2000))]
     pub qubits: u16,
     /// QAOA layers.

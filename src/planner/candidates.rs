@@ -136,11 +136,14 @@ fn grid_candidates(
 /// A path with as few corners as its length allows, and where that costs little with few enough to
 /// leave some qubits to the refinement.
 fn with_corners_that_fit(path: &[Xy], space: &LegSpace<'_>, qubits: usize) -> Vec<Xy> {
-    [1.0, 2.0, 4.0]
-        .into_iter()
-        .map(|factor| with_few_corners(path, space, factor * WORTH_OF_FEW))
-        .find(|path| 4 * path.len() <= 3 * qubits + 4)
-        .unwrap_or_else(|| with_few_corners(path, space, WORTH_OF_FEW))
+    let mut few = with_few_corners(path, space, WORTH_OF_FEW);
+    for factor in [2.0, 4.0] {
+        if 4 * few.len() <= 3 * qubits + 4 {
+            break;
+        }
+        few = with_few_corners(path, space, factor * WORTH_OF_FEW);
+    }
+    few
 }
 
 /// The shortest path, and then for each gap that it takes a short one with that gap shut.

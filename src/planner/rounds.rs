@@ -4,6 +4,8 @@
 //! distinct bitstring, and keeps the cheapest clean path. The incumbent (the all-zeros string) is
 //! always judged too, so a round never makes the path worse.
 
+use std::ops::Range;
+
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -12,11 +14,11 @@ use super::homotopy::passes_differently;
 use super::moves::moves;
 use super::polyline::{length, simplified};
 use super::settings::{Rounds, Settings};
-use super::stations::aligned;
+use super::stations::{Spare, aligned};
 use super::trellis::{EdgeJudge, Trellis};
 use crate::geodesy::Xy;
 use crate::qaoa::{
-    Angles, AnglesSource, Bits, EngineError, EngineKind, Ising, Qaoa, RunSettings, Scale, Settled,
+    Angles, AnglesSource, Bits, EngineError, EngineKind, Qaoa, RunSettings, Scale, Settled,
     TrainSettings,
 };
 use crate::stop::{Stop, Stopped};
@@ -31,6 +33,15 @@ pub enum Challenger {
     Refinement,
 }
 
+/// A part of a chain. The qubits outside keep the bits that they have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+pub struct Window {
+    /// Its first qubit, from 0.
+    pub first: usize,
+    /// Qubits of the whole chain.
+    pub of: usize,
+}
+
 /// The record of one round. Energies are metres; a collision counts `penalty` in them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Round {
@@ -38,8 +49,10 @@ pub struct Round {
     pub challenger: Challenger,
     /// The engine that ran.
     pub engine: EngineKind,
-    /// Qubits of the chain.
+    /// Qubits of the circuit.
     pub qubits: usize,
+    /// The part of a longer chain that these are, where the engine does not take all of it.
+    pub window: Option<Window>,
     /// Layers of the circuit.
     pub layers: usize,
     /// ⟨H⟩ at the start of the training and after each step.
@@ -105,7 +118,24 @@ const PROGRESS: f64 = 5e-5;
 const STRAIGHT: f64 = 1e-3;
 
 /// Steps of a training that starts from the angles of an earlier round.
-const CARRIED_STEPS: usize = 16;
+const CARRIED_STEPS: usize = 24;
+
+/// When such a training has settled.
+const CARRIED_SETTLED: Option<Settled> = Some(Settled { window: 4, tolerance: 3e-3 });
+
+/// When the training of a route round has settled that is not the leg's first.
+const ROUTE_SETTLED: Option<Settled> = Some(Settled { window: 6, tolerance: 3e-3 });
+
+/// Steps between two windows, as a share of their width: they overlap by half.
+const WINDOWS_OVERLAP: usize = 2;
+
+/// Windows of at most `most` qubits over a chain, from its start to its end.
+fn windows(qubits: usize, most: usize) -> Vec<Range<usize>> {
+    let width = most.clamp(1, qubits.max(1));
+    let step = (width / WINDOWS_OVERLAP).max(1);
+    let last = qubits - width.min(qubits);
+    (0..last).step_by(step).chain([last]).map(|first| first..first + width).collect()
+}
 
 /// The incumbent with all that the rounds share.
 pub struct Contest<'a> {
@@ -270,7 +300,8 @@ impl<'a> Contest<'a> {
         self.settings.qubits + 1
     }
 
-    /// One round between two polylines with the same ends.
+    /// One round between two polylines with the same ends; where the engine does not take the whole
+    /// chain, one for each window, each with the bits that those before it have found.
     fn round(
         &mut self,
         kind: Challenger,
@@ -282,55 +313,73 @@ impl<'a> Contest<'a> {
         if self.rounds.len() >= self.budget {
             return Ok(());
         }
-        let Some((a, b)) = aligned(&from, &to, self.settings.qubits) else {
+        let spare = if self.settings.full_training { Spare::Along } else { Spare::Alike };
+        let Some((a, b)) = aligned(&from, &to, self.settings.qubits, spare) else {
             return Ok(()); // a path without length: nothing to contest
         };
         let trellis = Trellis::new(a, b, &self.judge);
         let penalty = trellis.penalty();
-        let ising: Ising = trellis.ising(penalty)?.into();
-        let settings = self.run_settings(kind);
-        let run = self.qaoa.run(&ising, &settings, self.stop)?;
+        let chain = trellis.ising(penalty)?;
+        let most = self.settings.engine.most_qubits(self.settings.qubits);
+        let mut bits = Bits::zeros(trellis.qubits());
+        for window in windows(trellis.qubits(), most) {
+            let part = window.len() < trellis.qubits();
+            if part && trellis.is_idle(window.clone()) {
+                continue;
+            }
+            let Some(problem) = chain.window(window.clone(), &bits) else { continue };
+            let settings = self.run_settings(kind);
+            let run = self.qaoa.run(&problem.into(), &settings, self.stop)?;
 
-        let zeros = Bits::zeros(trellis.qubits());
-        let cost = |bits: &Bits| trellis.path_edges(bits).map(|edge| edge.cost()).sum::<f64>();
-        let stay = cost(&zeros);
-        let best = run
-            .samples
-            .iter()
-            .map(|sample| (cost(&sample.bits), &sample.bits))
-            .min_by(|x, y| x.0.total_cmp(&y.0));
-        let improved = best.is_some_and(|(cost, _)| cost < stay - 1e-9);
-        let chosen = match best {
-            Some((_, bits)) if improved => trellis.decode(bits),
-            _ => trellis.decode(&zeros),
-        };
-        let space = self.judge.space;
-        self.incumbent = simplified(&chosen, STRAIGHT, |a, b| space.is_clear(a, b));
-        self.angles[kind as usize] = Some(run.angles.clone());
+            let whole = |inner: &Bits| {
+                let mut whole = bits.clone();
+                inner.iter().zip(window.clone()).for_each(|(bit, qubit)| whole.set(qubit, bit));
+                whole
+            };
+            let cost = |bits: &Bits| trellis.path_edges(bits).map(|e| e.cost()).sum::<f64>();
+            let best = run
+                .samples
+                .iter()
+                .map(|sample| whole(&sample.bits))
+                .map(|bits| (cost(&bits), bits))
+                .min_by(|x, y| x.0.total_cmp(&y.0))
+                .filter(|(best, _)| *best < cost(&bits) - 1e-9);
+            let improved = best.is_some();
+            if let Some((_, best)) = best {
+                bits = best;
+            }
+            let space = self.judge.space;
+            self.incumbent =
+                simplified(&trellis.decode(&bits), STRAIGHT, |a, b| space.is_clear(a, b));
+            self.angles[kind as usize] = Some(run.angles.clone());
 
-        let best_sample = run.best.as_ref().map_or(f64::INFINITY, |best| best.energy);
-        let (exact_optimum, gap, p_optimum) = match &run.certificate {
-            Some(c) => (c.exact_optimum, c.gap.unwrap_or(f64::INFINITY), c.p_optimum),
-            None => (f64::NAN, f64::NAN, f64::NAN),
-        };
-        let round = Round {
-            challenger: kind,
-            engine: run.engine,
-            qubits: run.qubits,
-            layers: run.angles.layers(),
-            loss: run.loss,
-            distinct: run.samples.len(),
-            best_sample,
-            exact_optimum,
-            gap,
-            p_optimum,
-            penalty,
-            incumbent: self.incumbent.clone(),
-            length: length(&self.incumbent),
-            improved,
-        };
-        watch(&round);
-        self.rounds.push(round);
+            let (exact_optimum, gap, p_optimum) = match &run.certificate {
+                Some(c) => (c.exact_optimum, c.gap.unwrap_or(f64::INFINITY), c.p_optimum),
+                None => (f64::NAN, f64::NAN, f64::NAN),
+            };
+            let round = Round {
+                challenger: kind,
+                engine: run.engine,
+                qubits: run.qubits,
+                window: part.then_some(Window { first: window.start, of: trellis.qubits() }),
+                layers: run.angles.layers(),
+                loss: run.loss,
+                distinct: run.samples.len(),
+                best_sample: run.best.as_ref().map_or(f64::INFINITY, |best| best.energy),
+                exact_optimum,
+                gap,
+                p_optimum,
+                penalty,
+                incumbent: self.incumbent.clone(),
+                length: length(&self.incumbent),
+                improved,
+            };
+            watch(&round);
+            self.rounds.push(round);
+            if self.rounds.len() >= self.budget {
+                break;
+            }
+        }
         Ok(())
     }
 
@@ -341,16 +390,19 @@ impl<'a> Contest<'a> {
             learning_rate: settings.learning_rate,
             settled: None,
         };
-        let (angles, train) = match &self.angles[kind as usize] {
-            Some(angles) if !settings.full_training => {
-                let settled = Some(Settled { window: 3, tolerance: 1e-2 });
-                let steps = settings.steps.min(CARRIED_STEPS);
-                (
-                    AnglesSource::CarriedOver(angles.clone()),
-                    TrainSettings { steps, settled, ..full },
-                )
+        let ramp = AnglesSource::Ramp(settings.layers);
+        let (angles, train) = match (&self.angles[kind as usize], kind) {
+            _ if settings.full_training => (ramp, full),
+            (None, _) => (ramp, full),
+            // The trellises of different routes have little in common.
+            (Some(_), Challenger::Route) => {
+                (ramp, TrainSettings { settled: ROUTE_SETTLED, ..full })
             }
-            _ => (AnglesSource::Ramp(settings.layers), full),
+            (Some(angles), Challenger::Refinement) => {
+                let steps = settings.steps.min(CARRIED_STEPS);
+                let carried = AnglesSource::CarriedOver(angles.clone());
+                (carried, TrainSettings { steps, settled: CARRIED_SETTLED, ..full })
+            }
         };
         RunSettings {
             engine: settings.engine,
@@ -360,5 +412,19 @@ impl<'a> Contest<'a> {
             shots: settings.shots,
             seed: self.rng.random(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::windows;
+
+    #[test]
+    fn windows_cover_the_chain_and_overlap() {
+        assert_eq!(windows(20, usize::MAX), [0..20]);
+        assert_eq!(windows(20, 20), [0..20]);
+        assert_eq!(windows(21, 20), [0..20, 1..21]);
+        assert_eq!(windows(33, 8), [0..8, 4..12, 8..16, 12..20, 16..24, 20..28, 24..32, 25..33]);
+        assert_eq!(windows(3, 1), [0..1, 1..2, 2..3]);
     }
 }

@@ -39,6 +39,18 @@ pub enum EngineChoice {
     Only(EngineKind),
 }
 
+impl EngineChoice {
+    /// The most qubits of one run where a chain has more than `preferred`: `chain` is linear in their
+    /// number and takes any; on others a window of `preferred` qubits slides along.
+    #[must_use]
+    pub fn most_qubits(self, preferred: usize) -> usize {
+        match self {
+            Self::Auto | Self::Only(EngineKind::Chain) => usize::MAX,
+            Self::Only(_) => preferred,
+        }
+    }
+}
+
 /// A name that is no engine.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("there is no engine {0:?}; choose auto, chain or statevector")]

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::mission::legs::number as item_number;
 use crate::planner::candidates::{Candidate, Source};
-use crate::planner::rounds::{Challenger, Round};
+use crate::planner::rounds::{Challenger, Round, Window};
 use crate::replan::LegVerdict;
 use crate::report::stretch::Stretch;
 
@@ -38,8 +38,11 @@ pub struct RoundDocument {
     pub challenger: Challenger,
     /// The engine that ran.
     pub engine: String,
-    /// Qubits of the chain.
+    /// Qubits of the circuit.
     pub qubits: usize,
+    /// The part of a longer chain that they are, where the engine does not take all of it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub window: Option<Window>,
     /// Layers of the circuit.
     pub layers: usize,
     /// ⟨H⟩ at the start of the training and after each step.
@@ -103,6 +106,7 @@ impl From<&Round> for RoundDocument {
             challenger: round.challenger,
             engine: round.engine.to_string(),
             qubits: round.qubits,
+            window: round.window,
             layers: round.layers,
             loss: round.loss.clone(),
             best_sample: round.best_sample,
