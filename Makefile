@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(or $(CARGO_TARGET_DIR),target)/release/quavd
 PACKAGES := cmake g++ make pkg-config sqlite3 libsqlite3-dev python3-venv
 
-.PHONY: all build demo test test-rust test-python lint doc bench examples clean system
+.PHONY: all build demo test test-rust test-python lint doc bench bench-table bench-peers examples clean system
 
 all: build
 
@@ -57,7 +57,20 @@ doc: system
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --locked --no-deps
 
 bench: system
-	$(CARGO) bench --locked
+	$(CARGO) bench --locked --bench qaoa
+
+# Times and peak memory of engines and whole plans, one row each.
+bench-table: system
+	$(CARGO) bench --locked --bench table
+
+# quavd's engines beside PennyLane's, which takes minutes; STEPS=3 shortens its training.
+bench-peers: system $(VENV)-peers/.ready
+	QUAVD_PEERS_PYTHON=$(CURDIR)/$(VENV)-peers/bin/python $(CARGO) bench --locked --bench peers
+
+$(VENV)-peers/.ready: benches/requirements.txt
+	$(PYTHON) -m venv $(VENV)-peers
+	$(VENV)-peers/bin/pip install --quiet --disable-pip-version-check -r benches/requirements.txt
+	touch $@
 
 # The pictures in fence_examples/README.md.
 examples: build
@@ -70,4 +83,4 @@ examples: build
 
 clean:
 	$(CARGO) clean
-	rm -rf $(VENV) out
+	rm -rf $(VENV) $(VENV)-peers out

@@ -18,8 +18,8 @@ use super::stations::{Spare, aligned};
 use super::trellis::{EdgeJudge, Trellis};
 use crate::geodesy::Xy;
 use crate::qaoa::{
-    Angles, AnglesSource, Bits, EngineError, EngineKind, Qaoa, RunSettings, Scale, Settled,
-    TrainSettings,
+    Angles, AnglesSource, Bits, EngineError, EngineKind, Objective, Qaoa, RunSettings, Scale,
+    Settled, TrainSettings,
 };
 use crate::stop::{Stop, Stopped};
 
@@ -55,7 +55,11 @@ pub struct Round {
     pub window: Option<Window>,
     /// Layers of the circuit.
     pub layers: usize,
-    /// ⟨H⟩ at the start of the training and after each step.
+    /// What the training lowered.
+    pub objective: Objective,
+    /// Whether that was estimated from samples at every step.
+    pub loss_is_sampled: bool,
+    /// The objective at the start of the training and after each step.
     pub loss: Vec<f64>,
     /// Distinct bitstrings among the shots.
     pub distinct: usize,
@@ -363,6 +367,8 @@ impl<'a> Contest<'a> {
                 qubits: run.qubits,
                 window: part.then_some(Window { first: window.start, of: trellis.qubits() }),
                 layers: run.angles.layers(),
+                objective: run.objective,
+                loss_is_sampled: run.loss_is_sampled,
                 loss: run.loss,
                 distinct: run.samples.len(),
                 best_sample: run.best.as_ref().map_or(f64::INFINITY, |best| best.energy),
@@ -385,10 +391,17 @@ impl<'a> Contest<'a> {
 
     fn run_settings(&mut self, kind: Challenger) -> RunSettings {
         let settings = self.settings;
+        let objective = match settings.cvar {
+            None => Objective::Mean,
+            Some(alpha) => {
+                Objective::Cvar { alpha, shots: settings.shots, seed: self.rng.random() }
+            }
+        };
         let full = TrainSettings {
             steps: settings.steps,
             learning_rate: settings.learning_rate,
             settled: None,
+            objective,
         };
         let ramp = AnglesSource::Ramp(settings.layers);
         let (angles, train) = match (&self.angles[kind as usize], kind) {

@@ -154,6 +154,23 @@ pub trait Engine {
     /// If the circuit has too many layers or does not fit into memory.
     fn expectation_and_gradient(&mut self, angles: &Angles) -> Result<(f64, Angles), EngineError>;
 
+    /// The CVaR objective and its derivatives: the mean energy of the best share `alpha` (above 0, at
+    /// most 1) of all measurements. Exact where [`Engine::cvar_is_exact`] says so, and else estimated
+    /// from `shots` samples as the module [`super::cvar`] defines it.
+    ///
+    /// # Errors
+    /// If the circuit has too many layers or does not fit into memory.
+    fn cvar_and_gradient(
+        &mut self,
+        angles: &Angles,
+        alpha: f64,
+        shots: u32,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<(f64, Angles), EngineError>;
+
+    /// Whether CVaR is exact, without samples.
+    fn cvar_is_exact(&self) -> bool;
+
     /// Measures every qubit `shots` times; distinct bitstrings in ascending order. The same `rng` state
     /// gives the same samples.
     ///

@@ -45,7 +45,11 @@ pub struct RoundDocument {
     pub window: Option<Window>,
     /// Layers of the circuit.
     pub layers: usize,
-    /// ⟨H⟩ at the start of the training and after each step.
+    /// What the training lowered: `mean` (⟨H⟩) or `cvar α`.
+    pub objective: String,
+    /// Whether that was estimated from samples at every step.
+    pub loss_is_sampled: bool,
+    /// The objective at the start of the training and after each step.
     pub loss: Vec<f64>,
     /// Energy of the cheapest sample.
     pub best_sample: f64,
@@ -108,6 +112,8 @@ impl From<&Round> for RoundDocument {
             qubits: round.qubits,
             window: round.window,
             layers: round.layers,
+            objective: round.objective.to_string(),
+            loss_is_sampled: round.loss_is_sampled,
             loss: round.loss.clone(),
             best_sample: round.best_sample,
             exact_optimum: round.exact_optimum,
