@@ -8,16 +8,16 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 
 /// The paper's layers.
-pub const LAYERS: usize = 5;
+pub(crate) const LAYERS: usize = 5;
 /// What engines may use, bytes.
-pub const MEMORY: u64 = 8 << 30;
+pub(crate) const MEMORY: u64 = 8 << 30;
 
 fn coefficients(count: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
     (0..count).map(|_| rng.random_range(-1.0..1.0)).collect()
 }
 
 /// An open chain, as the planner makes them.
-pub fn chain(qubits: usize) -> ChainIsing {
+pub(crate) fn chain(qubits: usize) -> ChainIsing {
     let rng = &mut ChaCha8Rng::seed_from_u64(1);
     let (h, j) = (coefficients(qubits, rng), coefficients(qubits - 1, rng));
     let ising = Ising::from(ChainIsing::new(0.0, h, j).unwrap());
@@ -25,7 +25,7 @@ pub fn chain(qubits: usize) -> ChainIsing {
 }
 
 /// A random 3-regular graph: three stubs per qubit, paired at random until no pair is bad.
-pub fn three_regular(qubits: usize) -> Ising {
+pub(crate) fn three_regular(qubits: usize) -> Ising {
     let rng = &mut ChaCha8Rng::seed_from_u64(2);
     let couplings = loop {
         let mut stubs: Vec<usize> = (0..3 * qubits).map(|stub| stub / 3).collect();
@@ -49,7 +49,7 @@ const BLOCK: f64 = 60.0;
 
 /// A `.plan` with one leg across a town of so many obstacles: turned rectangles of 15 to 40 m, one on
 /// each place of a square grid. Streets may be too narrow; the way round the town never is.
-pub fn town(obstacles: usize) -> Value {
+pub(crate) fn town(obstacles: usize) -> Value {
     let rng = &mut ChaCha8Rng::seed_from_u64(obstacles as u64);
     let side = (obstacles as f64).sqrt().ceil();
     let at = |x: f64, y: f64| {
