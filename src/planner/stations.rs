@@ -76,7 +76,7 @@ pub fn aligned(one: &[Xy], other: &[Xy], edges: usize, spare: Spare) -> Option<(
     }
     let any_shared = (0..sections.len()).any(shared);
     let needed = counts.iter().sum::<usize>().min(edges);
-    if spare == Spare::Alike && !any_shared {
+    if spare == Spare::Alike && !any_shared && needed < edges {
         let mut aligned = aligned(one, other, needed, spare)?;
         for line in [&mut aligned.0, &mut aligned.1] {
             line.splice(0..0, std::iter::repeat_n(line[0], edges - needed));
