@@ -2,9 +2,10 @@
 //! and nowhere else.
 //!
 //! - [`options`]: what the commands have in common, with the names of the configuration file;
+//! - [`signing`]: the options that sign a link;
 //! - [`files`]: scenarios, missions and fences from files, results to files;
 //! - [`progress`]: what is shown while something runs;
-//! - [`plan`], [`check`], [`once`], [`compare`], [`qaoa`]: one command each;
+//! - [`plan`], [`check`], [`once`], [`compare`], [`qaoa`], [`ibm`]: one command each;
 //! - [`memory`]: what the machine has left;
 //! - [`exit`]: errors and their exit codes.
 
@@ -12,12 +13,14 @@ pub mod check;
 pub mod compare;
 pub mod exit;
 pub mod files;
+pub mod ibm;
 pub mod memory;
 pub mod once;
 pub mod options;
 pub mod plan;
 pub mod progress;
 pub mod qaoa;
+pub mod signing;
 
 use std::process::ExitCode;
 
@@ -51,6 +54,8 @@ enum Command {
     Compare(compare::CompareArgs),
     /// Run QAOA alone on an Ising problem.
     Qaoa(qaoa::QaoaArgs),
+    /// What the QPU path sees, chooses and sends.
+    Ibm(ibm::IbmCommand),
 }
 
 /// Runs the command of a parsed command line, prints its result on stdout and its error on
@@ -65,6 +70,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Check(args) => check::run(&args, &shown),
         Command::Compare(args) => compare::run(&args, &shown),
         Command::Qaoa(args) => qaoa::run(&args).map_err(CliError::from),
+        Command::Ibm(command) => ibm::run(&command),
     };
     match outcome {
         Ok(text) => exit::print(&text, ExitCode::SUCCESS),

@@ -134,16 +134,14 @@ fn grid_candidates(
 }
 
 /// A path with as few corners as its length allows, and where that costs little with few enough to
-/// leave some qubits to the refinement.
+/// leave some qubits to the refinement, or at least for one qubit an edge.
 fn with_corners_that_fit(path: &[Xy], space: &LegSpace<'_>, qubits: usize) -> Vec<Xy> {
-    let mut few = with_few_corners(path, space, WORTH_OF_FEW);
-    for factor in [2.0, 4.0] {
-        if 4 * few.len() <= 3 * qubits + 4 {
-            break;
-        }
-        few = with_few_corners(path, space, factor * WORTH_OF_FEW);
-    }
-    few
+    let few = |factor: f64| with_few_corners(path, space, factor * WORTH_OF_FEW);
+    let (all, fewest) = (few(1.0), few(4.0));
+    [all.clone(), few(2.0), fewest.clone()]
+        .into_iter()
+        .find(|path| 4 * path.len() <= 3 * qubits + 4)
+        .unwrap_or_else(|| if fewest.len() <= qubits + 1 { fewest } else { all })
 }
 
 /// The shortest path, and then for each gap that it takes a short one with that gap shut.

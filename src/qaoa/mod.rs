@@ -12,6 +12,7 @@ pub mod chain;
 pub mod cvar;
 pub mod engine;
 pub mod ising;
+pub mod qpu;
 pub mod run;
 mod simd;
 pub mod statevector;
