@@ -137,11 +137,17 @@ fn grid_candidates(
 /// leave some qubits to the refinement, or at least for one qubit an edge.
 fn with_corners_that_fit(path: &[Xy], space: &LegSpace<'_>, qubits: usize) -> Vec<Xy> {
     let few = |factor: f64| with_few_corners(path, space, factor * WORTH_OF_FEW);
-    let (all, fewest) = (few(1.0), few(4.0));
-    [all.clone(), few(2.0), fewest.clone()]
-        .into_iter()
-        .find(|path| 4 * path.len() <= 3 * qubits + 4)
-        .unwrap_or_else(|| if fewest.len() <= qubits + 1 { fewest } else { all })
+    let fits = |path: &[Xy]| 4 * path.len() <= 3 * qubits + 4;
+    let all = few(1.0);
+    if fits(&all) {
+        return all;
+    }
+    let fewer = few(2.0);
+    if fits(&fewer) {
+        return fewer;
+    }
+    let fewest = few(4.0);
+    if fewest.len() <= qubits + 1 { fewest } else { all }
 }
 
 /// The shortest path, and then for each gap that it takes a short one with that gap shut.
