@@ -5,15 +5,17 @@ PYTHON ?= python3
 VENV := .venv
 VENV_IBM := .venv-ibm
 BIN := $(or $(CARGO_TARGET_DIR),target)/release/quavd
-PACKAGES := cmake g++ make pkg-config sqlite3 libsqlite3-dev python3-venv
+PACKAGES := cmake g++ make pkg-config sqlite3 libsqlite3-dev python3-venv systemd
 
-.PHONY: all build demo test test-rust test-python test-ibm lint doc bench bench-link bench-ibm examples clean system
+TOOLS := target/tools
+
+.PHONY: all build demo ibm-demo deb test-deb soak daemon-figures test test-rust test-python test-ibm lint doc bench bench-link bench-ibm examples clean system
 
 all: build
 
 # PROJ is built from source and wants cmake and sqlite3; the tests want a venv.
 system:
-	@for tool in cmake g++ pkg-config sqlite3; do command -v $$tool >/dev/null || missing=1; done; \
+	@for tool in cmake g++ pkg-config sqlite3 systemd-analyze; do command -v $$tool >/dev/null || missing=1; done; \
 	test -e /usr/include/sqlite3.h || missing=1; \
 	if [ -n "$$missing" ]; then \
 		sudo=; [ "$$(id -u)" = 0 ] || sudo=sudo; \
@@ -42,6 +44,28 @@ build: system
 demo: build $(VENV)/.ready
 	$(VENV)/bin/python sitl/demo.py --quavd $(BIN) --scenario fence_examples/s1.plan --out out
 
+# A Debian package: program, unit, example configuration, man pages, completions.
+deb: build $(TOOLS)/bin/cargo-deb
+	rm -rf target/package
+	$(BIN) generate target/package
+	$(TOOLS)/bin/cargo-deb --no-build --no-strip --output target/debian/
+
+$(TOOLS)/bin/cargo-deb:
+	$(CARGO) install cargo-deb --locked --root $(TOOLS)
+
+# Installs, runs and purges it on this machine, which has to be one that can be thrown away.
+test-deb: deb
+	systemd/test-deb target/debian/quavd_*.deb
+
+# The daemon for an hour with everything that can happen to it; SOAK=MINUTES for another time.
+SOAK ?= 60
+soak: build $(VENV)/.ready
+	$(VENV)/bin/python sitl/soak.py --quavd $(BIN) --minutes $(SOAK)
+
+# Idle cost, and the time from a change on the vehicle to the verified upload.
+daemon-figures: build $(VENV)/.ready
+	$(VENV)/bin/python sitl/figures.py --quavd $(BIN)
+
 test: test-rust test-python test-ibm
 
 # One runner where there is one; plain cargo test does the same.
@@ -57,8 +81,12 @@ test-python: $(VENV)/.ready
 	cd sitl && MAVLINK20=1 ../$(VENV)/bin/python -m unittest
 
 # What needs qiskit is in a folder of its own, which the unittest above does not look into.
-test-ibm: $(VENV_IBM)/.ready
-	cd sitl && ../$(VENV_IBM)/bin/python -m unittest discover -s ibm
+test-ibm: build $(VENV_IBM)/.ready
+	cd sitl && QUAVD=$(abspath $(BIN)) ../$(VENV_IBM)/bin/python -m unittest discover -s ibm
+
+# The six scenarios on a stand-in of ibm_kyiv with its recorded errors, and a training on it. Some minutes.
+ibm-demo: build $(VENV_IBM)/.ready
+	$(VENV_IBM)/bin/python sitl/ibm_demo.py --quavd $(BIN) --out out
 
 lint: system
 	$(CARGO) fmt --check

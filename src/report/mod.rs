@@ -13,9 +13,9 @@ pub mod picture;
 pub mod run;
 pub mod stretch;
 pub mod summary;
-mod text;
+pub mod text;
 
 pub use run::Run;
 
 #[cfg(test)]
-mod samples;
+pub(crate) mod samples;

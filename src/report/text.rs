@@ -82,7 +82,7 @@ pub(super) fn count(number: usize, noun: &str) -> String {
 }
 
 /// A leg in a table's cell: items as ground stations count them.
-pub(super) fn leg_label(leg: &Leg) -> String {
+pub(crate) fn leg_label(leg: &Leg) -> String {
     let item = |item: Option<usize>| {
         item.map_or_else(|| "start".to_owned(), |item| item_number(item).to_string())
     };
