@@ -20,7 +20,7 @@ use crate::ibm::qpu::IbmQpu;
 use crate::link::{Endpoint, Link, Signer, Transport};
 use crate::mission::{self, Mission, MissionItem, MissionType};
 use crate::replan::{self, Input, Options, Replanned, replan_with};
-use crate::report::picture::picture;
+use crate::report::Report;
 use crate::stop::Stop;
 use crate::store::Store;
 use crate::vehicle::download::Downloaded;
@@ -51,8 +51,8 @@ pub struct OnceArgs {
     /// Print one JSON document on stdout.
     #[arg(long)]
     pub json: bool,
-    /// Write the result to a file; the suffix gives the format (.plan, .waypoints, .geojson, .kml,
-    /// .svg). May be repeated.
+    /// Write the result to a file; the suffix gives the format (.plan, .waypoints, .fence, .rally,
+    /// .fen, .geojson, .kml, .kmz; .svg, .png or .html to look at). May be repeated.
     #[arg(long, value_name = "FILE")]
     pub out: Vec<PathBuf>,
     /// Who is believed.
@@ -161,9 +161,9 @@ async fn with_vehicle(
             done = Delivery { written: true, verified: true };
         }
         shown.clear();
-        files::write_all(&args.out, &planned_scenario(&read.scenario, planned), || {
-            picture(planned, &outcome.run(), &format!("mission of {}", args.connect))
-        })?;
+        let title = format!("mission of {}", args.connect);
+        let report = Report::planned(planned, outcome.run(), &title, &read.scenario.fences);
+        files::write_all(&args.out, &planned_scenario(&read.scenario, planned), &report)?;
     }
     outcome.told(args.json, Some(done.told(vehicle, args.dry_run)))
 }
