@@ -41,7 +41,13 @@ pub fn loss_curves(scenarios: &[ScenarioResult]) -> String {
         .set("viewBox", (0.0, 0.0, WIDTH, HEIGHT))
         .set("font-family", "sans-serif")
         .set("font-size", 13)
-        .add(Rectangle::new().set("width", WIDTH).set("height", HEIGHT).set("fill", "#fff"))
+        .add(
+            Rectangle::new()
+                .set("width", WIDTH)
+                .set("height", HEIGHT)
+                .set("fill", "#fff")
+                .set("class", "plot"),
+        )
         .add(label("QAOA loss above the exact optimum, first training", LEFT, TOP - 18.0, "start"))
         .add(label("Adam step", f64::midpoint(LEFT, RIGHT), HEIGHT - 12.0, "middle"));
     for tick in 0..=4 {

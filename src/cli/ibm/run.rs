@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use serde_json::json;
 
-use super::super::once::state_directory;
+use super::super::options::state_directory;
 use super::super::qaoa::{document, read, summary};
 use super::super::{CliError, memory};
 use super::account::AccountArgs;
