@@ -10,7 +10,7 @@ PACKAGES := cmake g++ make pkg-config sqlite3 libsqlite3-dev python3-venv system
 TOOLS := target/tools
 
 .PHONY: all build demo ibm-demo deb test-deb soak daemon-figures test test-rust test-python test-ibm lint doc \
-	bench bench-link bench-ibm fuzz examples gallery reference clean system
+	bench bench-table bench-peers bench-link bench-ibm fuzz examples gallery reference clean system
 
 all: build
 
@@ -105,6 +105,19 @@ fuzz: system
 bench: system
 	$(CARGO) bench --locked --bench qaoa
 
+# Times and peak memory of engines and whole plans, one row each.
+bench-table: system
+	$(CARGO) bench --locked --bench table
+
+# quavd's engines beside PennyLane's, which takes minutes; STEPS=3 shortens its training.
+bench-peers: system $(VENV)-peers/.ready
+	QUAVD_PEERS_PYTHON=$(CURDIR)/$(VENV)-peers/bin/python $(CARGO) bench --locked --bench peers
+
+$(VENV)-peers/.ready: benches/requirements.txt
+	$(PYTHON) -m venv $(VENV)-peers
+	$(VENV)-peers/bin/pip install --quiet --disable-pip-version-check -r benches/requirements.txt
+	touch $@
+
 # Transfers on a 57,600 baud line and on one that loses 30 % each way.
 bench-link: system $(VENV)/.ready
 	QUAV_PYTHON=$(CURDIR)/$(VENV)/bin/python $(CARGO) bench --locked --bench link
@@ -133,4 +146,4 @@ gallery: build
 
 clean:
 	$(CARGO) clean
-	rm -rf $(VENV) $(VENV_IBM) out
+	rm -rf $(VENV) $(VENV)-peers $(VENV_IBM) out

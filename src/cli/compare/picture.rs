@@ -110,6 +110,9 @@ mod tests {
         let round = RoundDocument {
             challenger: Challenger::Route,
             engine: "chain".into(),
+            window: None,
+            objective: "mean".to_owned(),
+            loss_is_sampled: false,
             qubits: 20,
             layers: 5,
             loss: loss.to_vec(),
