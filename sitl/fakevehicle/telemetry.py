@@ -125,7 +125,7 @@ class Telemetry:
     def autopilot_version(self):
         version = self.vehicle.persona.flight_version
         return mavlink.MAVLink_autopilot_version_message(
-            CAPABILITIES, version, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0x66616B65)
+            CAPABILITIES, version, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, self.vehicle.uid)
 
     def fence_status(self):
         return mavlink.MAVLink_fence_status_message(0, 0, 0, 0)

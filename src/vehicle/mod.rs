@@ -1,7 +1,7 @@
 //! The vehicle at the other end of a link: finding it, knowing its state, and moving missions,
 //! fences and rally points without ever losing one.
 //!
-//! [`discovery`] finds it, [`state`] follows it, [`download`], [`upload`] and [`clear`] speak the mission
+//! [`discovery`] finds it, [`identity`] tells it from others, [`state`] follows it, [`download`], [`upload`] and [`clear`] speak the mission
 //! protocol over [`transfer`], [`readback`] compares what was sent with what is held,
 //! [`replace`] is the safe sequence of it all, [`numbering`] turns the vehicle's lists into
 //! missions and back.
@@ -9,6 +9,7 @@
 pub mod clear;
 pub mod discovery;
 pub mod download;
+pub mod identity;
 pub mod numbering;
 pub mod readback;
 pub mod replace;
@@ -25,6 +26,7 @@ use tokio::task::JoinHandle;
 use tokio::time::timeout;
 
 pub use discovery::{Autopilot, Capabilities, DiscoveryError, Search, find};
+pub use identity::{Uid, VehicleId};
 pub use state::{Position, VehicleState};
 pub use timing::Timing;
 pub use transfer::{MissionResult, Progress, TransferError};
@@ -37,6 +39,7 @@ pub struct Vehicle {
     node: Node,
     autopilot: Autopilot,
     capabilities: Option<Capabilities>,
+    uid: Option<Uid>,
     state: watch::Receiver<VehicleState>,
     monitor: JoinHandle<LinkError>,
     timing: Timing,
@@ -55,6 +58,12 @@ impl Vehicle {
     #[must_use]
     pub fn autopilot(&self) -> Autopilot {
         self.autopilot
+    }
+
+    /// Which vehicle it is, as far as it has told.
+    #[must_use]
+    pub fn id(&self) -> VehicleId {
+        VehicleId { system: self.node.system, autopilot: self.autopilot, uid: self.uid }
     }
 
     /// What it says it can do, where it says so.

@@ -1,7 +1,6 @@
 //! A plan is replaced as a whole or not at all, and quavd knows which, whatever happens on the
 //! way.
 
-use quav::link::SystemId;
 use quav::mission::{MissionItem, MissionType};
 use quav::store::{Outcome, Store};
 use quav::vehicle::replace::{
@@ -124,7 +123,7 @@ async fn a_refusal_in_the_middle_ends_with_the_old_plan_back() {
         let settled = if persona == "px4" { Settled::Untouched } else { Settled::PutBack };
         assert!(matches!(error.aftermath, Aftermath::Settled(s) if s == settled), "{error}");
         assert!(scene.is_as_before());
-        assert_eq!(store.open_record(SystemId(1), MISSION).unwrap(), None);
+        assert_eq!(store.open_record(&scene.vehicle().id(), MISSION).unwrap(), None);
         scene.session.close().await;
     }
 }
@@ -152,7 +151,7 @@ async fn a_link_lost_in_mid_upload_is_said_and_the_next_start_puts_the_old_plan_
         let error = scene.replace(&store).await.unwrap_err();
         assert_eq!(error.failure(), Failure::Unreachable, "{error}");
         assert!(matches!(error.aftermath, Aftermath::Unsettled { .. }), "{error}");
-        let open = store.open_record(SystemId(1), MISSION).unwrap().unwrap();
+        let open = store.open_record(&scene.vehicle().id(), MISSION).unwrap().unwrap();
         assert_eq!(open.before, scene.before);
         drop(store);
 
