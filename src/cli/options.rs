@@ -106,6 +106,10 @@ pub struct PlanningArgs {
     /// What being near an obstacle costs, metres: λ of λ·exp(−d/buffer). Higher keeps further off.
     #[arg(long, default_value_t = 0.05, value_parser = lambda, value_name = "M")]
     pub lambda: f64,
+    /// Most waypoints to insert in all; corners are merged until that is kept, the path getting
+    /// longer.
+    #[arg(long, value_name = "N")]
+    pub max_waypoints: Option<u16>,
     /// QAOA engine: auto, chain or statevector.
     #[arg(long, default_value = "auto", value_name = "ENGINE")]
     pub engine: EngineChoice,

@@ -1,8 +1,9 @@
 //! The vehicle at the other end of a link: finding it, knowing its state, and moving missions,
 //! fences and rally points without ever losing one.
 //!
-//! [`discovery`] finds it, [`identity`] tells it from others, [`state`] follows it, [`download`], [`upload`] and [`clear`] speak the mission
-//! protocol over [`transfer`], [`readback`] compares what was sent with what is held,
+//! [`discovery`] finds it, [`identity`] tells it from others, [`state`] follows it, [`parameter`]
+//! reads its parameters, [`download`], [`upload`] and [`clear`] speak the mission protocol over
+//! [`transfer`], [`readback`] compares what was sent with what is held,
 //! [`replace`] is the safe sequence of it all, [`numbering`] turns the vehicle's lists into
 //! missions and back.
 
@@ -11,6 +12,7 @@ pub mod discovery;
 pub mod download;
 pub mod identity;
 pub mod numbering;
+pub mod parameter;
 pub mod readback;
 pub mod replace;
 pub mod state;
@@ -27,6 +29,7 @@ use tokio::time::timeout;
 
 pub use discovery::{Autopilot, Capabilities, DiscoveryError, Search, find};
 pub use identity::{Uid, VehicleId};
+pub use parameter::{ParameterError, ParameterValue};
 pub use state::{Position, VehicleState};
 pub use timing::Timing;
 pub use transfer::{MissionResult, Progress, TransferError};

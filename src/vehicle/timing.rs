@@ -17,6 +17,8 @@ pub struct Timing {
     pub item_max: Duration,
     /// How many measured round trips to wait for an item.
     pub round_trips: u32,
+    /// For the answers to a round of questions for parameters.
+    pub parameter: Duration,
     /// How often a message is repeated before it can count as unanswered.
     pub retries: u32,
     /// A transfer that has not come forward for this long is given up, after the retries. Longer
@@ -48,6 +50,7 @@ impl Default for Timing {
             item_min: Duration::from_millis(250),
             item_max: Duration::from_millis(1500),
             round_trips: 4,
+            parameter: Duration::from_millis(400),
             retries: 5,
             patience: Duration::from_secs(10),
             restarts: 3,
@@ -63,6 +66,30 @@ impl Default for Timing {
 }
 
 impl Timing {
+    /// For a vehicle whose clock runs `factor` times as fast, as a simulator's can: its heartbeats
+    /// come that much faster, and it gives up that much earlier.
+    #[must_use]
+    pub fn faster(self, factor: f64) -> Self {
+        let scaled = |duration: Duration| duration.div_f64(factor);
+        Self {
+            request: scaled(self.request),
+            item_min: scaled(self.item_min),
+            item_max: scaled(self.item_max),
+            round_trips: self.round_trips,
+            parameter: scaled(self.parameter),
+            retries: self.retries,
+            patience: scaled(self.patience),
+            restarts: self.restarts,
+            busy: scaled(self.busy),
+            busy_pause: scaled(self.busy_pause),
+            explanation: scaled(self.explanation),
+            explanation_age: scaled(self.explanation_age),
+            fence_settles: scaled(self.fence_settles),
+            stragglers: scaled(self.stragglers),
+            silence: scaled(self.silence),
+        }
+    }
+
     /// A pause before asking a busy vehicle again, not the same for two clients that collided.
     pub(super) fn busy_pause(&self) -> Duration {
         // A hasher's random keys are random enough to keep two clients apart.
