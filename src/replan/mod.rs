@@ -16,6 +16,8 @@ pub mod judge;
 pub mod plan;
 pub mod reason;
 
+use std::time::Duration;
+
 use crate::airspace::InclusionRule;
 use crate::fence::FenceSet;
 use crate::geodesy::{LatLon, Zone};
@@ -25,7 +27,7 @@ use crate::planner::Settings;
 pub use fewer::{Fewer, replan_with_at_most};
 pub use field::{Field, FieldError};
 pub use judge::{LegVerdict, Verdict, fields, judge};
-pub use plan::{LegRecord, Progress, Replanned, replan};
+pub use plan::{LegRecord, Progress, Replanned, Stage, replan};
 pub use reason::ReplanError;
 
 /// What a mission is judged or planned with.
@@ -71,4 +73,6 @@ pub struct Options {
     pub zone: Option<Zone>,
     /// What several inclusions mean together.
     pub inclusion: InclusionRule,
+    /// How long planning may take; when that is over, the best clear path until then is used.
+    pub deadline: Option<Duration>,
 }

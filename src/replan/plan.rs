@@ -1,7 +1,7 @@
 //! Re-planning: the legs that are not clear get waypoints, the result is judged again.
 
 use std::collections::BTreeSet;
-use std::sync::atomic::AtomicBool;
+use std::fmt;
 
 use super::field::{Field, Fields};
 use super::judge::{Verdict, can_be_replanned, judge, verdict};
@@ -14,26 +14,50 @@ use crate::planner::candidates::Candidate;
 use crate::planner::leg::{LegRequest, LegTimes};
 use crate::planner::rounds::Round;
 use crate::planner::{LegOutcome, LegPlan, LegPlanner};
+use crate::stop::Stop;
 
 /// What happens while a mission is planned.
-#[derive(Debug, Clone)]
-pub enum Progress<'a> {
-    /// A leg that is not clear is taken on.
-    Leg {
-        /// Which of the legs to re-plan, from 1.
-        number: usize,
-        /// How many there are.
-        of: usize,
-        /// Its name.
-        name: String,
-    },
-    /// A QAOA round of that leg has ended.
+#[derive(Debug, Clone, Copy)]
+pub struct Progress<'a> {
+    /// Which of the legs to re-plan, from 1.
+    pub leg: usize,
+    /// How many there are.
+    pub legs: usize,
+    /// The leg's name.
+    pub name: &'a str,
+    /// How far it is.
+    pub stage: Stage<'a>,
+}
+
+/// How far a leg is.
+#[derive(Debug, Clone, Copy)]
+pub enum Stage<'a> {
+    /// Candidates are being looked for.
+    Candidates,
+    /// A QAOA round has ended.
     Round {
         /// Its number, from 1.
         number: usize,
         /// Its record.
         round: &'a Round,
     },
+    /// The leg has its path.
+    Planned,
+}
+
+impl fmt::Display for Progress<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { leg, legs, name, stage } = self;
+        write!(f, "leg {leg}/{legs} ({name}): ")?;
+        match stage {
+            Stage::Candidates => f.write_str("looking for candidates"),
+            Stage::Round { number, round } => {
+                let loss = round.loss.last().copied().unwrap_or(f64::NAN);
+                write!(f, "round {number}, loss {loss:.1}, length {:.1} m", round.length)
+            }
+            Stage::Planned => f.write_str("planned"),
+        }
+    }
 }
 
 /// A leg that was re-planned. Points are in the local metres of its zone.
@@ -51,6 +75,8 @@ pub struct LegRecord {
     pub candidates: Vec<Candidate>,
     /// The QAOA rounds.
     pub rounds: Vec<Round>,
+    /// Whether the deadline passed before these had brought all that they could.
+    pub cut_short: bool,
     /// Where the time went.
     pub times: LegTimes,
 }
@@ -80,19 +106,37 @@ impl Replanned {
     pub fn is_changed(&self) -> bool {
         !self.inserted.is_empty()
     }
+
+    /// What was used instead of what was asked for, and why; `None` where nothing was.
+    #[must_use]
+    pub fn fallback(&self) -> Option<String> {
+        let cut: Vec<String> = self
+            .legs
+            .iter()
+            .filter(|record| record.cut_short)
+            .map(|record| {
+                let (name, rounds) = (record.leg.name(), record.rounds.len());
+                let plural = if rounds == 1 { "" } else { "s" };
+                format!("the {name} has the best clear path after {rounds} QAOA round{plural}")
+            })
+            .collect();
+        (!cut.is_empty()).then(|| format!("the deadline passed: {}", cut.join("; ")))
+    }
 }
 
 /// Plans a mission: every leg that is not clear is re-planned, the waypoints are spliced in, and
-/// the new mission is judged from its integers.
+/// the new mission is judged from its integers. `stop` calls it off; the deadline of the options
+/// counts from now.
 ///
 /// # Errors
 /// [`ReplanError`] with the reason where there is no safe mission.
 pub fn replan(
     input: &Input<'_>,
     options: &Options,
-    cancelled: &AtomicBool,
+    stop: &Stop,
     mut watch: impl FnMut(Progress<'_>),
 ) -> Result<Replanned, ReplanError> {
+    let stop = options.deadline.map_or_else(|| stop.clone(), |time| stop.within(time));
     let flown = legs(input.mission, &input.context())?;
     let fields = Fields::new(&flown.legs, input.fences, options)?;
     let before = verdict(&flown, &fields, input, options)?;
@@ -104,7 +148,9 @@ pub fn replan(
     for (k, &index) in blocked.iter().enumerate() {
         let leg = &flown.legs[index];
         let name = leg.name().to_string();
-        watch(Progress::Leg { number: k + 1, of: blocked.len(), name });
+        let legs = blocked.len();
+        let mut tell = |stage: Stage<'_>| watch(Progress { leg: k + 1, legs, name: &name, stage });
+        tell(Stage::Candidates);
         let (zone, zoned) = fields
             .of(leg.from.position, leg.to.position)
             .ok_or_else(|| ReplanError::unjudged(leg, "its zone was not prepared"))?;
@@ -117,13 +163,14 @@ pub fn replan(
         let space = zoned.leg_space(options.settings.buffer.0, request.from, request.to);
         let mut number = 0;
         let outcome = planner
-            .plan(&request, &zoned.frame, &space, cancelled, |round| {
+            .plan(&request, &zoned.frame, &space, &stop, legs - k, |round| {
                 number += 1;
-                watch(Progress::Round { number, round });
+                tell(Stage::Round { number, round });
             })
             .map_err(|error| ReplanError::from_plan(error, leg, input.fences))?;
+        tell(Stage::Planned);
         if let LegOutcome::Replanned(plan) = outcome {
-            let LegPlan { finished, candidates, rounds, times } = *plan;
+            let LegPlan { finished, candidates, rounds, cut_short, times } = *plan;
             detours.push(Detour { leg: index, waypoints: finished.waypoints.clone() });
             records.push(LegRecord {
                 leg: *leg,
@@ -132,6 +179,7 @@ pub fn replan(
                 points: finished.points,
                 candidates,
                 rounds,
+                cut_short,
                 times,
             });
         }

@@ -44,6 +44,8 @@ pub struct SettingsDocument {
     pub zone: String,
     /// What several inclusions mean together.
     pub inclusion: String,
+    /// How long planning may take, seconds.
+    pub deadline: Option<f64>,
 }
 
 impl From<&Options> for SettingsDocument {
@@ -73,6 +75,7 @@ impl From<&Options> for SettingsDocument {
             full_training: settings.full_training,
             zone: options.zone.map_or_else(|| "auto".to_owned(), |zone| zone.to_string()),
             inclusion: options.inclusion.to_string(),
+            deadline: options.deadline.map(|time| time.as_secs_f64()),
         }
     }
 }
