@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(or $(CARGO_TARGET_DIR),target)/release/quavd
 PACKAGES := cmake g++ make pkg-config sqlite3 libsqlite3-dev python3-venv
 
-.PHONY: all build demo test test-rust test-python lint doc bench examples clean system
+.PHONY: all build demo faults test test-rust test-python lint doc bench examples clean system
 
 all: build
 
@@ -34,6 +34,15 @@ build: system
 # The main job: a fake vehicle with a mission through no-fly areas, re-planned, uploaded, verified.
 demo: build $(VENV)/.ready
 	$(VENV)/bin/python sitl/demo.py --quavd $(BIN) --scenario fence_examples/s1.plan --out out
+
+# The fault campaign at length: prints a table for each part, and the seeds of any run that failed.
+FAULT_RUNS ?= 2000
+FAULT_SEED ?= 1
+FAULT_WORKERS ?= 24
+faults: build $(VENV)/.ready
+	QUAV_PYTHON=$(CURDIR)/$(VENV)/bin/python QUAV_FAULT_RUNS=$(FAULT_RUNS) QUAV_FAULT_SEED=$(FAULT_SEED) \
+		QUAV_FAULT_WORKERS=$(FAULT_WORKERS) $(CARGO) test --release --locked --test it campaign:: -- \
+		--nocapture --test-threads 1
 
 test: test-rust test-python
 

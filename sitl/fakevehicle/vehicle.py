@@ -96,6 +96,8 @@ class Vehicle:
             return False
         self.current_seq = seq
         self.event("current", seq=seq)
+        if not self.persona.home_is_item_zero:  # PX4 tells at once, ArduPilot in its stream
+            self.broadcast(self.telemetry.mission_current())
         return True
 
     # ---- plans

@@ -12,6 +12,7 @@ pub mod check;
 pub mod compare;
 pub mod exit;
 pub mod files;
+mod flight;
 pub mod memory;
 pub mod once;
 pub mod options;

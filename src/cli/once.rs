@@ -8,6 +8,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::CliError;
 use super::files::{self, out_format};
+use super::flight::Flight;
 use super::options::PlanningArgs;
 use super::plan::{Delivered, Outcome, planned_scenario};
 use super::progress::Shown;
@@ -24,7 +25,7 @@ use crate::store::Store;
 use crate::vehicle::numbering::{to_mission, to_vehicle};
 use crate::vehicle::readback::differences;
 use crate::vehicle::replace::{Replacement, WhileArmed, pilots_own, replace, restore, settle};
-use crate::vehicle::{Autopilot, Search, Vehicle, find};
+use crate::vehicle::{Autopilot, Search, Timing, Vehicle, find};
 
 /// How long to wait for the vehicle's home and position.
 const PLACE_PATIENCE: Duration = Duration::from_secs(5);
@@ -51,6 +52,16 @@ pub struct OnceArgs {
     /// How long to wait for the vehicle's first heartbeat, seconds.
     #[arg(long, default_value_t = 15, value_parser = clap::value_parser!(u16).range(1..), value_name = "S")]
     pub wait: u16,
+    /// Also write to an armed vehicle: only items after the one it flies to, to an ArduPilot only
+    /// while it does not fly its mission, and only if the way to that item is clear.
+    #[arg(long)]
+    pub in_flight: bool,
+    /// Most mission items the vehicle has room for; more are refused before anything is written.
+    #[arg(long, value_name = "N")]
+    pub max_items: Option<u16>,
+    /// The vehicle is a simulation that runs this many times faster: so do all waiting times.
+    #[arg(long, default_value_t = 1.0, value_parser = speedup, value_name = "X")]
+    pub speedup: f64,
     /// Where originals and upload records are kept.
     #[arg(long, env = "STATE_DIRECTORY", value_name = "DIR")]
     pub state_dir: Option<PathBuf>,
@@ -64,6 +75,19 @@ pub struct OnceArgs {
     /// How to plan.
     #[command(flatten)]
     pub planning: PlanningArgs,
+}
+
+fn speedup(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (0.1..=100.0).contains(&value) => Ok(value),
+        _ => Err(format!("'{text}' is not a number from 0.1 to 100")),
+    }
+}
+
+impl OnceArgs {
+    fn while_armed(&self) -> WhileArmed {
+        if self.in_flight { WhileArmed::Allow } else { WhileArmed::Refuse }
+    }
 }
 
 /// Runs the command; returns what goes to stdout.
@@ -101,7 +125,7 @@ async fn with_link(args: &OnceArgs, link: &Link, shown: &Shown) -> Result<String
     let search = Search {
         system: args.system.map(SystemId),
         patience: Duration::from_secs(u64::from(args.wait)),
-        ..Search::default()
+        timing: Timing::default().faster(args.speedup),
     };
     let vehicle = find(link, &search).await?;
     let outcome = with_vehicle(args, &vehicle, &store, shown).await;
@@ -116,12 +140,13 @@ async fn with_vehicle(
     shown: &Shown,
 ) -> Result<String, CliError> {
     let mut on_step = |step| shown.step(step);
+    let while_armed = args.while_armed();
     if args.restore {
-        return put_back(vehicle, store, shown).await;
+        return put_back(vehicle, store, while_armed, shown).await;
     }
     if !args.dry_run {
         for plan in [MissionType::Fence, MissionType::Mission] {
-            let settled = settle(vehicle, store, plan, WhileArmed::Refuse, &mut on_step).await?;
+            let settled = settle(vehicle, store, plan, while_armed, &mut on_step).await?;
             if let Some(settled) = settled {
                 shown
                     .warn(&[format!("an earlier upload of the {plan} was not settled: {settled}")]);
@@ -148,11 +173,16 @@ async fn with_vehicle(
     if let Ok(planned) = &outcome.planned {
         let home_slot =
             (vehicle.autopilot() == Autopilot::ArduPilot).then(|| read.held.first()).flatten();
-        let intended = if planned.is_changed() {
-            to_vehicle(vehicle.autopilot(), &planned.mission, home_slot)
-        } else {
-            read.original.clone()
+        let mission = match &read.flight {
+            Some(flight) => flight.with(planned)?,
+            None => planned.mission.clone(),
         };
+        let intended = match (planned.is_changed(), &read.flight) {
+            (true, _) => to_vehicle(vehicle.autopilot(), &mission, home_slot),
+            (false, Some(_)) => read.held.clone(),
+            (false, None) => read.original.clone(),
+        };
+        fits(&mission, args.max_items)?;
         let same = differences(vehicle.autopilot(), MissionType::Mission, &intended, &read.held)
             .is_empty();
         done.verified = same;
@@ -163,7 +193,7 @@ async fn with_vehicle(
                 before: read.held.clone(),
                 intended,
             };
-            replace(vehicle, store, replacement, WhileArmed::Refuse, &mut on_step).await?;
+            replace(vehicle, store, replacement, while_armed, &mut on_step).await?;
             done = Delivery { written: true, verified: true };
         }
         shown.clear();
@@ -174,12 +204,28 @@ async fn with_vehicle(
     outcome.told(args.json, Some(done.told(vehicle, args.dry_run)))
 }
 
+/// Whether the vehicle has room for a mission, as far as that was told.
+fn fits(mission: &Mission, most: Option<u16>) -> Result<(), CliError> {
+    let items = mission.items.len();
+    match most {
+        Some(most) if items > usize::from(most) => Err(CliError::Refused(format!(
+            "the new mission has {items} items, more than the {most} of --max-items; nothing was \
+             written. Plan with fewer waypoints (--max-waypoints N)"
+        ))),
+        _ => Ok(()),
+    }
+}
+
 /// What `--restore` does: both plans that quavd may have written.
-async fn put_back(vehicle: &Vehicle, store: &Store, shown: &Shown) -> Result<String, CliError> {
+async fn put_back(
+    vehicle: &Vehicle,
+    store: &Store,
+    while_armed: WhileArmed,
+    shown: &Shown,
+) -> Result<String, CliError> {
     let mut on_step = |step| shown.step(step);
-    settle(vehicle, store, MissionType::Fence, WhileArmed::Refuse, &mut on_step).await?;
-    let record =
-        restore(vehicle, store, MissionType::Mission, WhileArmed::Refuse, &mut on_step).await?;
+    settle(vehicle, store, MissionType::Fence, while_armed, &mut on_step).await?;
+    let record = restore(vehicle, store, MissionType::Mission, while_armed, &mut on_step).await?;
     shown.clear();
     Ok(format!(
         "the original mission ({} items, saved in {}) is on the vehicle: read back and compared\n",
@@ -199,6 +245,9 @@ struct Read {
     start: Option<LatLon>,
     rally: Vec<LatLon>,
     autopilot: mission::Autopilot,
+    /// Where the vehicle is armed and may be written to all the same; the scenario's mission is
+    /// then only the rest of what it flies.
+    flight: Option<Flight>,
 }
 
 async fn read(
@@ -214,20 +263,32 @@ async fn read(
     shown.doing("waiting for the vehicle's home and position");
     let known =
         |state: &crate::vehicle::VehicleState| state.home.is_some() && state.position.is_some();
-    let _ = vehicle.wait_for(PLACE_PATIENCE, known).await;
+    let _ = vehicle.wait_for(PLACE_PATIENCE.div_f64(args.speedup), known).await;
     let state = vehicle.state();
 
     let original = pilots_own(vehicle, store, MissionType::Mission, &held).await?;
-    let mission = to_mission(vehicle.autopilot(), &original, state.home);
+    let mut mission = to_mission(vehicle.autopilot(), &original, state.home);
+    let flight = if state.is_armed() && args.in_flight {
+        // What the vehicle flies is what it holds, whatever that was made from.
+        let flown = to_mission(vehicle.autopilot(), &held, state.home);
+        Some(Flight::of(&state, vehicle.autopilot(), flown)?)
+    } else {
+        None
+    };
+    if let Some(flight) = &flight {
+        mission = flight.rest.clone();
+    }
     let decoded = decode_fence(&fence, None)?;
     let (mut fences, mut warnings) = (decoded.fences, decoded.warnings);
     files::add_fences(&mut fences, &mut warnings, &args.planning.safety)?;
     let places = rally_places(&rally)?;
     // The vehicle stands at home before it takes off; in flight its own place counts.
-    let start = state.position.map(|at| at.position).or(mission.home.map(|home| home.position));
+    let position = flight.as_ref().map(|flight| flight.position);
+    let position = position.or(state.position.map(|at| at.position));
+    let start = position.or(mission.home.map(|home| home.position));
     let scenario = Scenario { mission, fences, rally, warnings, ..Scenario::default() };
     let autopilot = vehicle.autopilot().into();
-    Ok(Read { scenario, held, original, start, rally: places, autopilot })
+    Ok(Read { scenario, held, original, start, rally: places, autopilot, flight })
 }
 
 /// The places of rally points.

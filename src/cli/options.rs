@@ -133,7 +133,13 @@ impl SafetyArgs {
     #[must_use]
     pub fn options(&self) -> Options {
         let settings = Settings { buffer: Metres(self.buffer), ..Settings::default() };
-        Options { settings, zone: self.zone.0, inclusion: self.inclusion, deadline: None }
+        Options {
+            settings,
+            zone: self.zone.0,
+            inclusion: self.inclusion,
+            most_waypoints: None,
+            deadline: None,
+        }
     }
 }
 
@@ -162,6 +168,7 @@ impl PlanningArgs {
             ..base
         };
         let deadline = self.deadline.map(Duration::from_secs_f64);
-        Options { settings, deadline, ..self.safety.options() }
+        let most_waypoints = self.max_waypoints.map(usize::from);
+        Options { settings, deadline, most_waypoints, ..self.safety.options() }
     }
 }

@@ -1,49 +1,49 @@
-//! Planning for a vehicle that has not room for many waypoints.
+//! Planning with a limit on the number of waypoints, for a vehicle that has not room for many.
 
-use std::sync::atomic::AtomicBool;
-
-use super::plan::{Progress, Replanned, replan};
+use super::plan::{Progress, Replanned, replan_as_set};
 use super::reason::ReplanError;
 use super::{Input, Options};
+use crate::stop::Stop;
 
 /// What saved waypoints may cost together, as shares of a leg's length: tried one after the other
-/// behind the settings' own.
+/// where the settings' own gives too many.
 const ALLOWANCES: [f64; 4] = [0.01, 0.05, 0.2, 1.0];
 
-/// A plan with few waypoints.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Fewer {
-    /// The plan.
-    pub planned: Replanned,
-    /// The share of its length that a leg was allowed to grow by, where that had to be more than
-    /// usual.
-    pub allowance: Option<f64>,
-}
-
-/// As [`replan`], with at most `most` inserted waypoints in all: corners are merged at a growing
-/// cost in length until there are few enough. Every leg keeps its buffer all the same.
+/// Plans a mission: every leg that is not clear is re-planned, the waypoints are spliced in, and
+/// the new mission is judged from its integers. `stop` calls it off; the deadline of the options
+/// counts from now.
+///
+/// Where the options limit the inserted waypoints, corners are merged at a growing cost in length
+/// until there are few enough, and a warning says so. Every leg keeps its buffer all the same.
 ///
 /// # Errors
-/// [`ReplanError`], with [`ReplanError::TooManyWaypoints`] where there are still more.
-pub fn replan_with_at_most(
-    most: Option<usize>,
+/// [`ReplanError`] with the reason where there is no safe mission, or none with so few waypoints.
+pub fn replan(
     input: &Input<'_>,
     options: &Options,
-    cancelled: &AtomicBool,
+    stop: &Stop,
     mut watch: impl FnMut(Progress<'_>),
-) -> Result<Fewer, ReplanError> {
-    let planned = replan(input, options, cancelled, &mut watch)?;
-    let Some(most) = most.filter(|&most| planned.inserted.len() > most) else {
-        return Ok(Fewer { planned, allowance: None });
+) -> Result<Replanned, ReplanError> {
+    let stop = options.deadline.map_or_else(|| stop.clone(), |time| stop.within(time));
+    let planned = replan_as_set(input, options, &stop, &mut watch)?;
+    let inserted = planned.inserted.len();
+    let Some(most) = options.most_waypoints.filter(|&most| inserted > most) else {
+        return Ok(planned);
     };
-    let mut least = planned.inserted.len();
+    let mut least = inserted;
     let mut options = options.clone();
     for allowance in ALLOWANCES {
         options.settings.corner_allowance = allowance;
-        let planned = replan(input, &options, cancelled, &mut watch)?;
+        let mut planned = replan_as_set(input, &options, &stop, &mut watch)?;
         least = least.min(planned.inserted.len());
         if planned.inserted.len() <= most {
-            return Ok(Fewer { planned, allowance: Some(allowance) });
+            planned.before.warnings.push(format!(
+                "corners were merged, {} waypoints instead of {inserted}: each re-planned leg may \
+                 be up to {} % longer for it",
+                planned.inserted.len(),
+                allowance * 100.0
+            ));
+            return Ok(planned);
         }
     }
     Err(ReplanError::TooManyWaypoints { most, least })

@@ -24,10 +24,10 @@ use crate::geodesy::{LatLon, Zone};
 use crate::mission::{Autopilot, FlightContext, LoiterHabit, Mission};
 use crate::planner::Settings;
 
-pub use fewer::{Fewer, replan_with_at_most};
+pub use fewer::replan;
 pub use field::{Field, FieldError};
 pub use judge::{LegVerdict, Verdict, fields, judge};
-pub use plan::{LegRecord, Progress, Replanned, Stage, replan};
+pub use plan::{LegRecord, Progress, Replanned, Stage};
 pub use reason::ReplanError;
 
 /// What a mission is judged or planned with.
@@ -73,6 +73,8 @@ pub struct Options {
     pub zone: Option<Zone>,
     /// What several inclusions mean together.
     pub inclusion: InclusionRule,
+    /// Most waypoints to insert, in all.
+    pub most_waypoints: Option<usize>,
     /// How long planning may take; when that is over, the best clear path until then is used.
     pub deadline: Option<Duration>,
 }

@@ -124,19 +124,16 @@ impl Replanned {
     }
 }
 
-/// Plans a mission: every leg that is not clear is re-planned, the waypoints are spliced in, and
-/// the new mission is judged from its integers. `stop` calls it off; the deadline of the options
-/// counts from now.
+/// Plans a mission as its settings say, with as many waypoints as that takes.
 ///
 /// # Errors
 /// [`ReplanError`] with the reason where there is no safe mission.
-pub fn replan(
+pub(super) fn replan_as_set(
     input: &Input<'_>,
     options: &Options,
     stop: &Stop,
-    mut watch: impl FnMut(Progress<'_>),
+    watch: &mut impl FnMut(Progress<'_>),
 ) -> Result<Replanned, ReplanError> {
-    let stop = options.deadline.map_or_else(|| stop.clone(), |time| stop.within(time));
     let flown = legs(input.mission, &input.context())?;
     let fields = Fields::new(&flown.legs, input.fences, options)?;
     let before = verdict(&flown, &fields, input, options)?;
@@ -163,7 +160,7 @@ pub fn replan(
         let space = zoned.leg_space(options.settings.buffer.0, request.from, request.to);
         let mut number = 0;
         let outcome = planner
-            .plan(&request, &zoned.frame, &space, &stop, legs - k, |round| {
+            .plan(&request, &zoned.frame, &space, stop, legs - k, |round| {
                 number += 1;
                 tell(Stage::Round { number, round });
             })

@@ -205,7 +205,7 @@ pub(crate) fn place(item: &Value) -> LatLonE7 {
     LatLonE7 { lat: read("x"), lon: read("y") }
 }
 
-fn item_json(item: &MissionItem) -> Value {
+pub(crate) fn item_json(item: &MissionItem) -> Value {
     let number = |value: f32| if value.is_nan() { Value::Null } else { json!(value) };
     json!({
         "seq": item.seq, "frame": item.frame.0, "command": item.command.0,
