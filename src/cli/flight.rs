@@ -2,7 +2,7 @@
 
 use super::CliError;
 use crate::geodesy::LatLon;
-use crate::mission::{Mission, rejoined, remaining};
+use crate::mission::{Command, Frame, Mission, MissionItem, rejoined, remaining};
 use crate::replan::Replanned;
 use crate::vehicle::{Autopilot, VehicleState};
 
@@ -14,9 +14,12 @@ pub(super) struct Flight {
     current: usize,
     /// Where the vehicle is.
     pub(super) position: LatLon,
-    /// The items from the current one on, as a mission of their own.
+    /// A waypoint where the vehicle is, and the items from the current one on, as a mission.
     pub(super) rest: Mission,
 }
+
+/// Index in [`Flight::rest`] of the item that the vehicle flies to.
+const NEXT: usize = 1;
 
 impl Flight {
     /// # Errors
@@ -32,13 +35,27 @@ impl Flight {
                 "the vehicle is in flight and does not tell {what}; nothing was written"
             ))
         };
-        let position = state.position.ok_or_else(|| unknown("where it is"))?.position;
+        let here = state.position.ok_or_else(|| unknown("where it is"))?;
+        let position = here.position;
         let current = state.mission_current.ok_or_else(|| unknown("which item it flies to"))?;
         let home_slots = usize::from(autopilot == Autopilot::ArduPilot);
         let current = usize::from(current.seq).saturating_sub(home_slots);
         let rest = remaining(&whole, current).map_err(|error| {
             CliError::Refused(format!("the mission cannot be planned in flight: {error}"))
         })?;
+        let place = position.to_e7();
+        let here = MissionItem {
+            seq: 0,
+            frame: Frame::GLOBAL_RELATIVE_ALT,
+            command: Command::NAV_WAYPOINT,
+            current: 0,
+            autocontinue: 1,
+            params: [0.0; 4],
+            x: place.lat,
+            y: place.lon,
+            z: here.altitude_relative,
+        };
+        let rest = rejoined(&Mission { home: whole.home, items: vec![here] }, NEXT, &rest);
         Ok(Self { whole, current, position, rest })
     }
 
@@ -48,7 +65,7 @@ impl Flight {
     /// [`CliError::NoPath`] where the vehicle would have to go another way to the item it flies
     /// to: that item is not changed under way.
     pub(super) fn with(&self, planned: &Replanned) -> Result<Mission, CliError> {
-        if planned.inserted.first() == Some(&0) {
+        if planned.inserted.first() == Some(&NEXT) {
             return Err(CliError::NoPath {
                 reason: format!(
                     "the way from where the vehicle is to item {} is not clear, and the current \
@@ -58,6 +75,9 @@ impl Flight {
                 document: None,
             });
         }
-        Ok(rejoined(&self.whole, self.current, &planned.mission))
+        let rest = remaining(&planned.mission, NEXT).map_err(|error| {
+            CliError::Refused(format!("the planned mission is not complete: {error}"))
+        })?;
+        Ok(rejoined(&self.whole, self.current, &rest))
     }
 }

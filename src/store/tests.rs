@@ -129,10 +129,7 @@ fn a_damaged_record_is_an_error_and_not_forgotten() {
     fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
     let read = store.open_record(&VEHICLE, MissionType::Mission);
     let error = read.unwrap_err().to_string();
-    assert!(
-        error.contains("mission-1-000001.json") && error.contains("move it away"),
-        "{error}"
-    );
+    assert!(error.contains("mission-1-000001.json") && error.contains("move it away"), "{error}");
     assert_eq!(store.begin(beginning(2)).unwrap().number, 2, "its number is not used again");
 }
 

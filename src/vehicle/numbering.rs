@@ -62,8 +62,8 @@ pub fn to_vehicle(
 pub(super) fn for_whole_centimetres(z: f32) -> f32 {
     let centimetres = (f64::from(z) * 100.0).round();
     let is_kept = |z: f32| f64::from((z * 100.0).trunc()) == centimetres;
-    let is_whole = (f64::from(z) * 100.0 - centimetres).abs()
-        <= centimetres.abs() * f64::from(f32::EPSILON);
+    let is_whole =
+        (f64::from(z) * 100.0 - centimetres).abs() <= centimetres.abs() * f64::from(f32::EPSILON);
     if !is_whole || is_kept(z) {
         return z;
     }

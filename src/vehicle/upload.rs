@@ -7,7 +7,6 @@ use std::time::Duration;
 
 use tokio::time::Instant;
 
-use super::{Vehicle, VehicleState};
 use super::discovery::Autopilot;
 use super::numbering::for_whole_centimetres;
 use super::timing::Patience;
@@ -15,6 +14,7 @@ use super::transfer::{
     Awaited, BusyWait, Direction, Exchange, Heard, MOST_ITEMS, MissionResult, OnProgress, Progress,
     Refusal, Setback, TransferError,
 };
+use super::{Vehicle, VehicleState};
 use crate::link::message::{MissionAck, MissionCount, MissionItemInt};
 use crate::mission::{MissionItem, MissionType};
 

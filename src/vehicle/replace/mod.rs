@@ -82,7 +82,8 @@ pub async fn replace(
     let state = may_write(vehicle, while_armed).await?;
     let flight = InFlight::of(vehicle, &state, mission_type, &held, &mut intended)?;
     let permit = flight.map_or(Permit::OnTheGround, Permit::InFlight);
-    let beginning = Beginning { vehicle: vehicle.id(), mission_type, original, before: held, intended };
+    let beginning =
+        Beginning { vehicle: vehicle.id(), mission_type, original, before: held, intended };
     let mut record = on_disk(store, move |store| store.begin(beginning)).await?;
     tracing::info!(plan = %mission_type, saved = %store.path_of(&record).display(), "old plan saved");
 

@@ -11,10 +11,10 @@ use super::settle::{Finding, Suspect, finding};
 use super::{OnStep, Step, held};
 use crate::mission::{MissionItem, MissionType};
 use crate::store::Record;
+use crate::vehicle::Vehicle;
 use crate::vehicle::readback::{changes, differences};
 use crate::vehicle::transfer::{OnProgress, Setback, TransferError};
 use crate::vehicle::upload::{BusyHabit, Uploaded};
-use crate::vehicle::Vehicle;
 
 /// Which plan of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -101,8 +101,7 @@ impl Putting<'_> {
         let mission_type = self.record.mission_type;
         let on_progress: OnProgress<'_> = &mut |progress| on_step(Step::Proving(progress));
         let held = self.vehicle.download(mission_type, on_progress).await?.items;
-        let differences =
-            differences(self.vehicle.autopilot(), mission_type, self.items(), &held);
+        let differences = differences(self.vehicle.autopilot(), mission_type, self.items(), &held);
         if differences.is_empty() {
             return Ok(held);
         }

@@ -98,7 +98,12 @@ pub(super) enum Finding {
 }
 
 /// What is found, for one who suspects the given party.
-pub(super) fn finding(vehicle: &VehicleId, record: &Record, held: &[MissionItem], suspect: Suspect) -> Finding {
+pub(super) fn finding(
+    vehicle: &VehicleId,
+    record: &Record,
+    held: &[MissionItem],
+    suspect: Suspect,
+) -> Finding {
     let Record { mission_type, before, intended, .. } = record;
     let (autopilot, mission_type) = (vehicle.autopilot, *mission_type);
     if changes(autopilot, mission_type, before, held).is_empty() {

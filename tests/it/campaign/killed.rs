@@ -80,9 +80,7 @@ impl Moment {
             0 | 1 => Self::After(Duration::from_millis(rng.random_range(0..2500))),
             2 => Self::Event("download_start", nothing, rng.random_range(1..=3), later),
             3 => Self::Event("upload_start", nothing, 1, later),
-            4 | 5 => {
-                Self::Event("upload_item", json!({"item": rng.random_range(0..5)}), 1, later)
-            }
+            4 | 5 => Self::Event("upload_item", json!({"item": rng.random_range(0..5)}), 1, later),
             6 => Self::Event("upload_ended", nothing, 1, later),
             // The read-back comes after mission, fence and rally, and the mission once more.
             _ => Self::Event("download_start", json!({"type": "mission"}), 3, later),
@@ -116,8 +114,7 @@ fn start_and_kill(fake: &mut FakeVehicle, state: &Path, moment: &Moment) -> bool
 pub(super) fn carry_out(fakes: &mut Fakes, seed: u64, expected: &Expected) -> Ended {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let persona = usize::from(rng.random_bool(0.5));
-    let moments: Vec<_> =
-        (0..rng.random_range(1..=3)).map(|_| Moment::random(&mut rng)).collect();
+    let moments: Vec<_> = (0..rng.random_range(1..=3)).map(|_| Moment::random(&mut rng)).collect();
     let mut faults = Vec::new();
     if rng.random_bool(0.4) {
         faults.push(format!("drop:p={:.2}", rng.random_range(0.0..0.3)));

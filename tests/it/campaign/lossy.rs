@@ -34,8 +34,7 @@ pub(super) fn carry_out(fakes: &mut Fakes, seed: u64) -> Ended {
             before: vec![],
             intended: intended.clone(),
         };
-        let replaced =
-            replace(vehicle, &store, replacement, WhileArmed::Refuse, &mut |_| {}).await;
+        let replaced = replace(vehicle, &store, replacement, WhileArmed::Refuse, &mut |_| {}).await;
         fake.control(&serde_json::json!({"cmd": "clear-faults"}));
         let held = vehicle.download(MISSION, &mut |_| {}).await.unwrap().items;
         let is_new = differences(vehicle.autopilot(), MISSION, &intended, &held).is_empty();
