@@ -12,16 +12,18 @@ use super::flight::Flight;
 use super::options::PlanningArgs;
 use super::plan::{Delivered, Outcome, planned_scenario};
 use super::progress::Shown;
+use super::signing::SigningArgs;
 use crate::fence::FenceSet;
 use crate::fence::items::decode_fence;
 use crate::formats::Scenario;
 use crate::geodesy::LatLon;
-use crate::link::{ComponentId, Endpoint, Identity, Link, SystemId, Transport};
+use crate::link::{ComponentId, Endpoint, Identity, Link, Signer, SystemId, Transport};
 use crate::mission::{self, Mission, MissionItem, MissionType};
 use crate::replan::{self, Input, Options, Replanned, replan};
 use crate::report::picture::picture;
 use crate::stop::Stop;
 use crate::store::Store;
+use crate::vehicle::download::Downloaded;
 use crate::vehicle::numbering::{to_mission, to_vehicle};
 use crate::vehicle::readback::differences;
 use crate::vehicle::replace::{Replacement, WhileArmed, pilots_own, replace, restore, settle};
@@ -72,6 +74,9 @@ pub struct OnceArgs {
     /// .svg). May be repeated.
     #[arg(long, value_name = "FILE")]
     pub out: Vec<PathBuf>,
+    /// Who is believed.
+    #[command(flatten)]
+    pub signing: SigningArgs,
     /// How to plan.
     #[command(flatten)]
     pub planning: PlanningArgs,
@@ -106,7 +111,11 @@ pub fn run(args: OnceArgs, shown: &Shown) -> Result<String, CliError> {
     runtime.block_on(async {
         let cancel = CancellationToken::new();
         shown.doing(format!("connecting to {}", args.connect));
-        let transport = Transport::open(&args.connect).await?;
+        let mut transport = Transport::open(&args.connect).await?;
+        if let Some(settings) = args.signing.settings() {
+            let state = state_directory(args.state_dir.as_ref())?;
+            transport = transport.signed(Signer::open(&settings, &state)?);
+        }
         let identity = Identity {
             system: SystemId(args.system.unwrap_or(1)),
             component: ComponentId(args.component),
@@ -257,9 +266,12 @@ async fn read(
     shown: &Shown,
 ) -> Result<Read, CliError> {
     let mut on_progress = |progress| shown.transfer(progress);
-    let held = vehicle.download(MissionType::Mission, &mut on_progress).await?.items;
-    let fence = vehicle.download(MissionType::Fence, &mut on_progress).await?.items;
-    let rally = vehicle.download(MissionType::Rally, &mut on_progress).await?.items;
+    let mission = vehicle.read_plan(MissionType::Mission, &mut on_progress).await?;
+    let fence = vehicle.read_plan(MissionType::Fence, &mut on_progress).await?;
+    let rally = vehicle.read_plan(MissionType::Rally, &mut on_progress).await?;
+    let fell_back: Vec<String> =
+        [&mission, &fence, &rally].into_iter().filter_map(Downloaded::fell_back).collect();
+    let (held, fence, rally) = (mission.items, fence.items, rally.items);
     shown.doing("waiting for the vehicle's home and position");
     let known =
         |state: &crate::vehicle::VehicleState| state.home.is_some() && state.position.is_some();
@@ -279,7 +291,8 @@ async fn read(
         mission = flight.rest.clone();
     }
     let decoded = decode_fence(&fence, None)?;
-    let (mut fences, mut warnings) = (decoded.fences, decoded.warnings);
+    let (mut fences, mut warnings) = (decoded.fences, fell_back);
+    warnings.extend(decoded.warnings);
     files::add_fences(&mut fences, &mut warnings, &args.planning.safety)?;
     let places = rally_places(&rally)?;
     // The vehicle stands at home before it takes off; in flight its own place counts.
