@@ -246,6 +246,7 @@ class Vehicle:
         self.life += 1
         for server in self.servers.values():
             server.reset()
+        self.ftp.reset()
         for channel in self.channels:
             self.telemetry.stop(channel)
             channel.heard.clear()

@@ -211,7 +211,8 @@ mod tests {
         let px4 = |mode| is_flying_mission(Autopilot::Px4, &state(12, 2, mode, true));
         assert!(px4(0x0404_0000) && !px4(0x0304_0000) && !px4(3));
         let mut loitering = state(3, 2, 5, true);
-        loitering.mission_current = Some(MissionCurrent { seq: 2, total: 5, state: 3, mode: 0 });
+        loitering.mission_current =
+            Some(MissionCurrent { seq: 2, total: 5, state: 3, mode: 0, plan_ids: [0; 3] });
         assert!(is_flying_mission(Autopilot::ArduPilot, &loitering), "it says so itself");
     }
 }
