@@ -258,7 +258,7 @@ fn plain(frame: Frame) -> Frame {
 fn cut_to(unit: f32, sent: f32, held: f32) -> bool {
     let rounding = 4.0 * f32::EPSILON * sent.abs().max(1.0);
     let cut_off = (sent - held) * 1.0_f32.copysign(sent);
-    (-rounding..=unit + rounding).contains(&cut_off)
+    held * sent >= 0.0 && (-rounding..=unit + rounding).contains(&cut_off)
 }
 
 fn same_angle(sent: f32, held: f32) -> bool {
