@@ -7,7 +7,7 @@ VENV_IBM := .venv-ibm
 BIN := $(or $(CARGO_TARGET_DIR),target)/release/quavd
 PACKAGES := cmake g++ make pkg-config sqlite3 libsqlite3-dev python3-venv
 
-.PHONY: all build demo faults test test-rust test-python test-ibm lint doc bench bench-link bench-ibm examples clean system
+.PHONY: all build demo ibm-demo faults test test-rust test-python test-ibm lint doc bench bench-link bench-ibm examples clean system
 
 all: build
 
@@ -66,8 +66,12 @@ test-python: $(VENV)/.ready
 	cd sitl && MAVLINK20=1 ../$(VENV)/bin/python -m unittest
 
 # What needs qiskit is in a folder of its own, which the unittest above does not look into.
-test-ibm: $(VENV_IBM)/.ready
-	cd sitl && ../$(VENV_IBM)/bin/python -m unittest discover -s ibm
+test-ibm: build $(VENV_IBM)/.ready
+	cd sitl && QUAVD=$(abspath $(BIN)) ../$(VENV_IBM)/bin/python -m unittest discover -s ibm
+
+# The six scenarios on a stand-in of ibm_kyiv with its recorded errors, and a training on it. Some minutes.
+ibm-demo: build $(VENV_IBM)/.ready
+	$(VENV_IBM)/bin/python sitl/ibm_demo.py --quavd $(BIN) --out out
 
 lint: system
 	$(CARGO) fmt --check

@@ -5,7 +5,7 @@
 //! - [`signing`]: the options that sign a link;
 //! - [`files`]: scenarios, missions and fences from files, results to files;
 //! - [`progress`]: what is shown while something runs;
-//! - [`plan`], [`check`], [`once`], [`compare`], [`qaoa`]: one command each;
+//! - [`plan`], [`check`], [`once`], [`compare`], [`qaoa`], [`ibm`]: one command each;
 //! - [`memory`]: what the machine has left;
 //! - [`exit`]: errors and their exit codes.
 
@@ -14,6 +14,7 @@ pub mod compare;
 pub mod exit;
 pub mod files;
 mod flight;
+pub mod ibm;
 pub mod memory;
 pub mod once;
 pub mod options;
@@ -54,6 +55,8 @@ enum Command {
     Compare(compare::CompareArgs),
     /// Run QAOA alone on an Ising problem.
     Qaoa(qaoa::QaoaArgs),
+    /// What the QPU path sees, chooses and sends.
+    Ibm(ibm::IbmCommand),
 }
 
 /// Runs the command of a parsed command line, prints its result on stdout and its error on
@@ -68,6 +71,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Check(args) => check::run(&args, &shown),
         Command::Compare(args) => compare::run(&args, &shown),
         Command::Qaoa(args) => qaoa::run(&args).map_err(CliError::from),
+        Command::Ibm(command) => ibm::run(&command),
     };
     match outcome {
         Ok(text) => exit::print(&text, ExitCode::SUCCESS),

@@ -9,7 +9,7 @@ use tokio_util::sync::CancellationToken;
 use super::CliError;
 use super::files::{self, out_format};
 use super::flight::Flight;
-use super::options::PlanningArgs;
+use super::options::{PlanningArgs, as_qpu};
 use super::plan::{Delivered, Outcome, planned_scenario};
 use super::progress::Shown;
 use super::signing::SigningArgs;
@@ -17,9 +17,10 @@ use crate::fence::FenceSet;
 use crate::fence::items::decode_fence;
 use crate::formats::Scenario;
 use crate::geodesy::LatLon;
+use crate::ibm::qpu::IbmQpu;
 use crate::link::{ComponentId, Endpoint, Identity, Link, Signer, SystemId, Transport};
 use crate::mission::{self, Mission, MissionItem, MissionType};
-use crate::replan::{self, Input, Options, Replanned, replan};
+use crate::replan::{self, Input, Options, Replanned, replan_with};
 use crate::report::picture::picture;
 use crate::stop::Stop;
 use crate::store::Store;
@@ -173,7 +174,8 @@ async fn with_vehicle(
         ));
     }
     let load = began.elapsed();
-    let planned = plan_off_thread(&read, &options, shown).await;
+    let qpu = args.planning.qpu(args.state_dir.as_ref())?;
+    let planned = plan_off_thread(&read, &options, qpu, shown).await;
     let warnings = &read.scenario.warnings;
     let total = began.elapsed();
     let outcome = Outcome { planned, before: None, options: &options, warnings, load, total };
@@ -323,6 +325,7 @@ pub(super) fn rally_places(rally: &[MissionItem]) -> Result<Vec<LatLon>, CliErro
 async fn plan_off_thread(
     read: &Read,
     options: &Options,
+    mut qpu: Option<IbmQpu>,
     shown: &Shown,
 ) -> Result<Replanned, CliError> {
     let stop = Stop::new();
@@ -335,7 +338,7 @@ async fn plan_off_thread(
             let input =
                 Input { mission: &mission, fences: &fences, rally: &rally, start, autopilot };
             let watch = |progress: replan::Progress<'_>| shown.planning(&progress);
-            replan(&input, &options, &stop, watch)
+            replan_with(&input, &options, as_qpu(&mut qpu), &stop, watch)
         })
     };
     tokio::pin!(task);
@@ -384,7 +387,7 @@ impl Delivery {
 
 /// Where records are kept: the option (or systemd's `STATE_DIRECTORY`), else the user's state
 /// directory.
-fn state_directory(chosen: Option<&PathBuf>) -> Result<PathBuf, CliError> {
+pub(super) fn state_directory(chosen: Option<&PathBuf>) -> Result<PathBuf, CliError> {
     if let Some(path) = chosen {
         return Ok(path.clone());
     }

@@ -5,11 +5,16 @@ use std::time::Duration;
 
 use clap::Args;
 
-use super::memory;
+use super::ibm::account::AccountArgs;
+use super::once::state_directory;
+use super::{CliError, memory};
 use crate::airspace::InclusionRule;
 use crate::geodesy::Zone;
-use crate::planner::{CandidateSource, Rounds, Settings};
-use crate::qaoa::EngineChoice;
+use crate::ibm::client::backends::BackendChoice;
+use crate::ibm::qpu::IbmQpu;
+use crate::planner::{CandidateSource, QpuSettings, QpuTraining, Rounds, Settings};
+use crate::qaoa::qpu::Qpu;
+use crate::qaoa::{EngineChoice, EngineKind};
 use crate::replan::Options;
 use crate::units::Metres;
 
@@ -115,7 +120,7 @@ pub struct PlanningArgs {
     /// longer.
     #[arg(long, value_name = "N")]
     pub max_waypoints: Option<u16>,
-    /// QAOA engine: auto, chain or statevector.
+    /// QAOA engine: auto, chain, statevector, or ibm (a QPU; see the options below).
     #[arg(long, default_value = "auto", value_name = "ENGINE")]
     pub engine: EngineChoice,
     /// How long planning may take, seconds; then the best clear path until then is used, and the
@@ -126,6 +131,50 @@ pub struct PlanningArgs {
     /// every round, 5 m buffer, grid candidates.
     #[arg(long, conflicts_with_all = ["buffer", "qubits", "layers", "steps", "learning_rate", "candidates", "grid"])]
     pub paper: bool,
+    /// On a QPU.
+    #[command(flatten)]
+    pub qpu: QpuArgs,
+}
+
+/// How to plan with `--engine ibm`.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Options of --engine ibm")]
+pub struct QpuArgs {
+    /// The backend: a name, or least_busy. With --paper it is ibm_kyiv, if nothing is said.
+    #[arg(long, value_name = "NAME")]
+    pub backend: Option<BackendChoice>,
+    /// Where angles are trained: local (the exact engine) or qpu (20 Adam steps, a job each).
+    #[arg(long, default_value = "local", value_name = "local|qpu")]
+    pub train: QpuTraining,
+    /// Jobs of a leg at most, those of a training not counted.
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..=100))]
+    pub qpu_jobs: u16,
+    /// Circuits in a job, a QAOA round each.
+    #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u16).range(1..=100))]
+    pub qpu_circuits: u16,
+    /// End with exit code 6 where the QPU gives nothing, instead of planning locally.
+    #[arg(long)]
+    pub no_fallback: bool,
+    /// Who pays.
+    #[command(flatten)]
+    pub account: AccountArgs,
+}
+
+impl QpuArgs {
+    fn settings(&self) -> QpuSettings {
+        QpuSettings {
+            training: self.train,
+            jobs: usize::from(self.qpu_jobs),
+            circuits: usize::from(self.qpu_circuits),
+            fallback: !self.no_fallback,
+            ..QpuSettings::default()
+        }
+    }
+}
+
+/// The QPU as the planner takes it.
+pub(super) fn as_qpu(qpu: &mut Option<IbmQpu>) -> Option<&mut dyn Qpu> {
+    qpu.as_mut().map(|qpu| qpu as &mut dyn Qpu)
 }
 
 impl SafetyArgs {
@@ -144,6 +193,21 @@ impl SafetyArgs {
 }
 
 impl PlanningArgs {
+    /// The QPU, where one was asked for. Its record of jobs is in the state directory.
+    ///
+    /// # Errors
+    /// [`CliError`] without usable credentials or a usable state directory.
+    pub fn qpu(&self, state: Option<&PathBuf>) -> Result<Option<IbmQpu>, CliError> {
+        if self.engine != EngineChoice::Only(EngineKind::Ibm) {
+            return Ok(None);
+        }
+        let choice = self.qpu.backend.clone().unwrap_or(match self.paper {
+            true => BackendChoice::Named("ibm_kyiv".to_owned()),
+            false => BackendChoice::LeastBusy,
+        });
+        self.qpu.account.qpu(&choice, &state_directory(state)?).map(Some)
+    }
+
     /// The options of the library.
     #[must_use]
     pub fn options(&self) -> Options {
@@ -165,6 +229,7 @@ impl PlanningArgs {
             lambda: Metres(self.lambda),
             engine: self.engine,
             memory_limit: memory::available(),
+            qpu: self.qpu.settings(),
             ..base
         };
         let deadline = self.deadline.map(Duration::from_secs_f64);

@@ -8,11 +8,11 @@ use serde::Serialize;
 
 use super::CliError;
 use super::files::{self, out_format};
-use super::options::PlanningArgs;
+use super::options::{PlanningArgs, as_qpu};
 use super::progress::Shown;
 use crate::formats::Scenario;
 use crate::geodesy::LatLon;
-use crate::replan::{Input, Options, Progress, Replanned, Verdict, fields, judge, replan};
+use crate::replan::{Input, Options, Progress, Replanned, Verdict, fields, judge, replan_with};
 use crate::report::Run;
 use crate::report::json::PlanDocument;
 use crate::report::picture::{Subject, picture};
@@ -31,6 +31,9 @@ pub struct PlanArgs {
     /// .svg). May be repeated.
     #[arg(long, value_name = "FILE")]
     pub out: Vec<PathBuf>,
+    /// Where jobs for a QPU are recorded.
+    #[arg(long, env = "STATE_DIRECTORY", value_name = "DIR")]
+    pub state_dir: Option<PathBuf>,
     /// How to plan.
     #[command(flatten)]
     pub planning: PlanningArgs,
@@ -61,7 +64,9 @@ pub fn run(args: &PlanArgs, shown: &Shown) -> Result<String, CliError> {
     };
     let load = began.elapsed();
     let watch = |progress: Progress<'_>| shown.planning(&progress);
-    let planned = replan(&input, &options, &Stop::new(), watch);
+    let mut qpu = args.planning.qpu(args.state_dir.as_ref())?;
+    let planned = replan_with(&input, &options, as_qpu(&mut qpu), &Stop::new(), watch);
+    drop(qpu);
     let planned = planned.map_err(CliError::from);
     shown.clear();
     let before = match &planned {

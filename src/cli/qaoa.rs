@@ -198,7 +198,7 @@ fn settings(args: &QaoaArgs) -> Result<RunSettings, QaoaCommandError> {
     })
 }
 
-fn read(path: &Path) -> Result<Ising, QaoaCommandError> {
+pub(super) fn read(path: &Path) -> Result<Ising, QaoaCommandError> {
     let failed = |source| QaoaCommandError::Read { path: path.to_owned(), source };
     let mut bytes = Vec::new();
     let input: Box<dyn Read> = if path == Path::new("-") {
@@ -217,7 +217,7 @@ fn read(path: &Path) -> Result<Ising, QaoaCommandError> {
 }
 
 /// What `--json` prints. Energies are in the units of the input; angles apply to the scaled problem.
-fn document(run: &QaoaRun, time_ms: f64) -> Value {
+pub(super) fn document(run: &QaoaRun, time_ms: f64) -> Value {
     let samples: Map<String, Value> =
         run.samples.iter().map(|s| (s.bits.to_string(), json!(s.count))).collect();
     let best = run.best.as_ref().map(
@@ -251,7 +251,7 @@ fn list(values: &[f64]) -> String {
 }
 
 /// What is printed without `--json`.
-fn summary(run: &QaoaRun, time_ms: f64) -> String {
+pub(super) fn summary(run: &QaoaRun, time_ms: f64) -> String {
     let mut text = String::new();
     // Writing to a string does not fail.
     let mut line = |line: std::fmt::Arguments<'_>| {

@@ -15,9 +15,10 @@ use super::settings::{Rounds, Settings};
 use super::stations::aligned;
 use super::trellis::{EdgeJudge, Trellis};
 use crate::geodesy::Xy;
+use crate::qaoa::qpu::QpuError;
 use crate::qaoa::{
-    Angles, AnglesSource, Bits, EngineError, EngineKind, Ising, Qaoa, RunSettings, Scale, Settled,
-    TrainSettings,
+    Angles, AnglesSource, Bits, EngineError, EngineKind, Ising, Qaoa, QaoaRun, RunSettings, Scale,
+    Settled, TrainSettings,
 };
 use crate::stop::{Stop, Stopped};
 
@@ -62,6 +63,36 @@ pub struct Round {
     pub length: f64,
     /// Whether the round replaced the incumbent.
     pub improved: bool,
+    /// What a QPU measured, where one ran the circuit.
+    pub qpu: Option<QpuRound>,
+}
+
+/// What a QPU measured in a round. Energies are metres, as those of the [`Round`].
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct QpuRound {
+    /// The processor.
+    pub backend: String,
+    /// Where the angles were trained: on the QPU, or by the exact local engine.
+    pub trained_on: &'static str,
+    /// ⟨H⟩ of the shots with readout errors taken out.
+    pub expectation: f64,
+    /// ⟨H⟩ of the shots as they were read.
+    pub raw_expectation: f64,
+    /// The standard error of `expectation` from the number of shots.
+    pub standard_error: f64,
+    /// ⟨H⟩ of the circuit without errors, by the local engine.
+    pub ideal_expectation: f64,
+    /// The standard errors of the loss, where the QPU trained.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub loss_errors: Vec<f64>,
+}
+
+/// Two polylines as a problem.
+pub(super) struct Pair {
+    pub(super) kind: Challenger,
+    pub(super) trellis: Trellis,
+    pub(super) penalty: f64,
+    pub(super) ising: Ising,
 }
 
 /// Why the rounds ended without a result.
@@ -76,6 +107,9 @@ pub enum RoundError {
     /// The plan was called off, or its time is up.
     #[error(transparent)]
     Stopped(#[from] Stopped),
+    /// The QPU gave nothing, and nothing else was allowed.
+    #[error(transparent)]
+    Qpu(#[from] QpuError),
 }
 
 /// Refinement rounds at least, and rounds without progress before the end, where the number of
@@ -96,10 +130,10 @@ const RIVAL: f64 = 1.06;
 const STEPS_SHRINK_OVER: usize = 24;
 
 /// How often moves are drawn until one moves something.
-const PROPOSALS: usize = 8;
+pub(super) const PROPOSALS: usize = 8;
 
 /// An improvement that counts as progress, as a share of the path's length.
-const PROGRESS: f64 = 5e-5;
+pub(super) const PROGRESS: f64 = 5e-5;
 
 /// Points this near to the line between their neighbours are no corners, metres.
 const STRAIGHT: f64 = 1e-3;
@@ -109,17 +143,17 @@ const CARRIED_STEPS: usize = 16;
 
 /// The incumbent with all that the rounds share.
 pub struct Contest<'a> {
-    judge: EdgeJudge<'a>,
-    settings: &'a Settings,
-    qaoa: &'a mut Qaoa,
-    rng: ChaCha8Rng,
-    incumbent: Vec<Xy>,
+    pub(super) judge: EdgeJudge<'a>,
+    pub(super) settings: &'a Settings,
+    pub(super) qaoa: &'a mut Qaoa,
+    pub(super) rng: ChaCha8Rng,
+    pub(super) incumbent: Vec<Xy>,
     /// The last angles of route rounds and of refinements.
-    angles: [Option<Angles>; 2],
-    rounds: Vec<Round>,
+    pub(super) angles: [Option<Angles>; 2],
+    pub(super) rounds: Vec<Round>,
     /// Rounds at most.
-    budget: usize,
-    stop: &'a Stop,
+    pub(super) budget: usize,
+    pub(super) stop: &'a Stop,
 }
 
 /// What the rounds of a leg came to.
@@ -131,6 +165,8 @@ pub struct Contested {
     pub rounds: Vec<Round>,
     /// Whether the deadline passed before the rounds had brought all that they could.
     pub cut_short: bool,
+    /// What ran instead of the QPU that was asked for, and why.
+    pub fallback: Option<String>,
 }
 
 impl From<EngineError> for RoundError {
@@ -180,10 +216,10 @@ impl<'a> Contest<'a> {
             Err(RoundError::Stopped(Stopped::DeadlinePassed)) => true,
             Err(error) => return Err(error),
         };
-        Ok(Contested { path: self.incumbent, rounds: self.rounds, cut_short })
+        Ok(Contested { path: self.incumbent, rounds: self.rounds, cut_short, fallback: None })
     }
 
-    fn all_rounds(
+    pub(super) fn all_rounds(
         &mut self,
         others: &[Candidate],
         watch: &mut impl FnMut(&Round),
@@ -261,12 +297,12 @@ impl<'a> Contest<'a> {
     }
 
     /// What a path costs, collisions as the paper reports them.
-    fn cost(&self, path: &[Xy]) -> f64 {
+    pub(super) fn cost(&self, path: &[Xy]) -> f64 {
         path.windows(2).map(|edge| self.judge.edge(edge[0], edge[1]).cost()).sum()
     }
 
     /// Corners that an incumbent may have.
-    fn room(&self) -> usize {
+    pub(super) fn room(&self) -> usize {
         self.settings.qubits + 1
     }
 
@@ -282,15 +318,39 @@ impl<'a> Contest<'a> {
         if self.rounds.len() >= self.budget {
             return Ok(());
         }
-        let Some((a, b)) = aligned(&from, &to, self.settings.qubits) else {
-            return Ok(()); // a path without length: nothing to contest
-        };
+        let Some(pair) = self.pair(kind, &from, &to)? else { return Ok(()) };
+        let settings = self.run_settings(kind);
+        let run = self.qaoa.run(&pair.ising, &settings, self.stop)?;
+        self.angles[kind as usize] = Some(run.angles.clone());
+        self.decide(&pair, run, None, f64::INFINITY, watch);
+        Ok(())
+    }
+
+    /// Two polylines as a problem; `None` for a path without length, where nothing is to contest.
+    pub(super) fn pair(
+        &self,
+        kind: Challenger,
+        from: &[Xy],
+        to: &[Xy],
+    ) -> Result<Option<Pair>, RoundError> {
+        let Some((a, b)) = aligned(from, to, self.settings.qubits) else { return Ok(None) };
         let trellis = Trellis::new(a, b, &self.judge);
         let penalty = trellis.penalty();
         let ising: Ising = trellis.ising(penalty)?.into();
-        let settings = self.run_settings(kind);
-        let run = self.qaoa.run(&ising, &settings, self.stop)?;
+        Ok(Some(Pair { kind, trellis, penalty, ising }))
+    }
 
+    /// Judges every sample of a run; the cheapest path is the incumbent if it is cheaper than staying
+    /// and than `champion`. Gives the cost of the cheapest.
+    pub(super) fn decide(
+        &mut self,
+        pair: &Pair,
+        run: QaoaRun,
+        qpu: Option<QpuRound>,
+        champion: f64,
+        watch: &mut impl FnMut(&Round),
+    ) -> f64 {
+        let trellis = &pair.trellis;
         let zeros = Bits::zeros(trellis.qubits());
         let cost = |bits: &Bits| trellis.path_edges(bits).map(|edge| edge.cost()).sum::<f64>();
         let stay = cost(&zeros);
@@ -299,14 +359,17 @@ impl<'a> Contest<'a> {
             .iter()
             .map(|sample| (cost(&sample.bits), &sample.bits))
             .min_by(|x, y| x.0.total_cmp(&y.0));
-        let improved = best.is_some_and(|(cost, _)| cost < stay - 1e-9);
+        let improved = best.is_some_and(|(cost, _)| cost < stay.min(champion) - 1e-9);
         let chosen = match best {
-            Some((_, bits)) if improved => trellis.decode(bits),
-            _ => trellis.decode(&zeros),
+            Some((_, bits)) if improved => Some(trellis.decode(bits)),
+            // Without an earlier champion the incumbent is what this pair made of it.
+            _ if champion.is_infinite() => Some(trellis.decode(&zeros)),
+            _ => None,
         };
         let space = self.judge.space;
-        self.incumbent = simplified(&chosen, STRAIGHT, |a, b| space.is_clear(a, b));
-        self.angles[kind as usize] = Some(run.angles.clone());
+        if let Some(chosen) = chosen {
+            self.incumbent = simplified(&chosen, STRAIGHT, |a, b| space.is_clear(a, b));
+        }
 
         let best_sample = run.best.as_ref().map_or(f64::INFINITY, |best| best.energy);
         let (exact_optimum, gap, p_optimum) = match &run.certificate {
@@ -314,7 +377,7 @@ impl<'a> Contest<'a> {
             None => (f64::NAN, f64::NAN, f64::NAN),
         };
         let round = Round {
-            challenger: kind,
+            challenger: pair.kind,
             engine: run.engine,
             qubits: run.qubits,
             layers: run.angles.layers(),
@@ -324,17 +387,18 @@ impl<'a> Contest<'a> {
             exact_optimum,
             gap,
             p_optimum,
-            penalty,
+            penalty: pair.penalty,
             incumbent: self.incumbent.clone(),
             length: length(&self.incumbent),
             improved,
+            qpu,
         };
         watch(&round);
         self.rounds.push(round);
-        Ok(())
+        best.map_or(stay, |(cost, _)| cost).min(stay)
     }
 
-    fn run_settings(&mut self, kind: Challenger) -> RunSettings {
+    pub(super) fn run_settings(&mut self, kind: Challenger) -> RunSettings {
         let settings = self.settings;
         let full = TrainSettings {
             steps: settings.steps,
@@ -353,7 +417,7 @@ impl<'a> Contest<'a> {
             _ => (AnglesSource::Ramp(settings.layers), full),
         };
         RunSettings {
-            engine: settings.engine,
+            engine: settings.engine.local(),
             scale: Scale::Sigma,
             angles,
             train,

@@ -68,6 +68,50 @@ impl std::str::FromStr for Rounds {
     }
 }
 
+/// Where the angles of circuits for a QPU are trained.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum QpuTraining {
+    /// By the exact local engine; the QPU only samples.
+    #[default]
+    Local,
+    /// On the QPU, as in the paper: the first circuit of a leg is trained there, and the others carry its
+    /// angles over.
+    Qpu,
+}
+
+impl std::str::FromStr for QpuTraining {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "local" => Ok(Self::Local),
+            "qpu" => Ok(Self::Qpu),
+            _ => Err(format!("'{text}' is neither local nor qpu")),
+        }
+    }
+}
+
+/// How a leg is planned on a QPU.
+#[derive(Debug, Clone, PartialEq)]
+pub struct QpuSettings {
+    /// Where angles are trained.
+    pub training: QpuTraining,
+    /// Adam steps of a training on the QPU (paper: 20).
+    pub steps: usize,
+    /// Jobs of a leg at most, those of a training not counted.
+    pub jobs: usize,
+    /// Circuits in each of them, one QAOA round each.
+    pub circuits: usize,
+    /// Whether the local engine goes on where the QPU gives nothing.
+    pub fallback: bool,
+}
+
+impl Default for QpuSettings {
+    fn default() -> Self {
+        Self { training: QpuTraining::Local, steps: 20, jobs: 3, circuits: 6, fallback: true }
+    }
+}
+
 /// How a leg is planned. The defaults are the paper's table of settings, where it has one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
@@ -106,6 +150,8 @@ pub struct Settings {
     pub corner_allowance: f64,
     /// Memory that an engine may use, bytes.
     pub memory_limit: u64,
+    /// What is different on a QPU.
+    pub qpu: QpuSettings,
 }
 
 impl Default for Settings {
@@ -127,6 +173,7 @@ impl Default for Settings {
             full_training: false,
             corner_allowance: WORTH_OF_FEW,
             memory_limit: 4 << 30,
+            qpu: QpuSettings::default(),
         }
     }
 }

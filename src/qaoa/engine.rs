@@ -18,6 +18,8 @@ pub enum EngineKind {
     Chain,
     /// Exact, for any graph; 2ⁿ amplitudes.
     Statevector,
+    /// No simulator: an IBM QPU, for open chains.
+    Ibm,
 }
 
 impl fmt::Display for EngineKind {
@@ -25,6 +27,7 @@ impl fmt::Display for EngineKind {
         f.pad(match self {
             Self::Chain => "chain",
             Self::Statevector => "statevector",
+            Self::Ibm => "ibm",
         })
     }
 }
@@ -41,8 +44,19 @@ pub enum EngineChoice {
 
 /// A name that is no engine.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("there is no engine {0:?}; choose auto, chain or statevector")]
+#[error("there is no engine {0:?}; choose auto, chain, statevector or ibm")]
 pub struct NoSuchEngine(String);
+
+impl EngineChoice {
+    /// Which simulator trains, and runs what a QPU does not.
+    #[must_use]
+    pub fn local(self) -> Self {
+        match self {
+            Self::Only(EngineKind::Ibm) => Self::Auto,
+            choice => choice,
+        }
+    }
+}
 
 impl FromStr for EngineChoice {
     type Err = NoSuchEngine;
@@ -52,6 +66,7 @@ impl FromStr for EngineChoice {
             "auto" => Ok(Self::Auto),
             "chain" => Ok(Self::Only(EngineKind::Chain)),
             "statevector" => Ok(Self::Only(EngineKind::Statevector)),
+            "ibm" => Ok(Self::Only(EngineKind::Ibm)),
             other => Err(NoSuchEngine(other.into())),
         }
     }
@@ -79,6 +94,11 @@ pub enum EngineError {
         /// Second qubit.
         j: usize,
     },
+    /// A QPU was asked for where only simulators run.
+    #[error(
+        "the ibm engine is no simulator; it runs with quavd plan, once and run, and with quavd ibm run"
+    )]
+    NoQpu,
     /// The workspace would not fit.
     #[error(
         "the {engine} engine needs {} MiB for {qubits} qubits, but {} MiB are available; use fewer \

@@ -11,6 +11,7 @@ pub mod bits;
 pub mod chain;
 pub mod engine;
 pub mod ising;
+pub mod qpu;
 pub mod run;
 mod simd;
 pub mod statevector;

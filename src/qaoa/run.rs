@@ -214,6 +214,7 @@ impl Qaoa {
                 let (i, j) = distant.map_or((0, 0), |&(i, j, _)| (i, j));
                 Err(EngineError::NotAChain { i, j })
             }
+            (EngineKind::Ibm, _) => Err(EngineError::NoQpu),
             (EngineKind::Statevector, _) => {
                 self.statevector = None;
                 let engine = StatevectorEngine::new(ising, self.precision, self.memory_limit)?;

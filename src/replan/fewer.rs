@@ -3,6 +3,7 @@
 use super::plan::{Progress, Replanned, replan_as_set};
 use super::reason::ReplanError;
 use super::{Input, Options};
+use crate::qaoa::qpu::Qpu;
 use crate::stop::Stop;
 
 /// What saved waypoints may cost together, as shares of a leg's length: tried one after the other
@@ -22,10 +23,24 @@ pub fn replan(
     input: &Input<'_>,
     options: &Options,
     stop: &Stop,
+    watch: impl FnMut(Progress<'_>),
+) -> Result<Replanned, ReplanError> {
+    replan_with(input, options, None, stop, watch)
+}
+
+/// [`replan`] with the QAOA rounds on a QPU, if there is one.
+///
+/// # Errors
+/// As [`replan`].
+pub fn replan_with(
+    input: &Input<'_>,
+    options: &Options,
+    mut qpu: Option<&mut dyn Qpu>,
+    stop: &Stop,
     mut watch: impl FnMut(Progress<'_>),
 ) -> Result<Replanned, ReplanError> {
     let stop = options.deadline.map_or_else(|| stop.clone(), |time| stop.within(time));
-    let planned = replan_as_set(input, options, &stop, &mut watch)?;
+    let planned = replan_as_set(input, options, again(&mut qpu), &stop, &mut watch)?;
     let inserted = planned.inserted.len();
     let Some(most) = options.most_waypoints.filter(|&most| inserted > most) else {
         return Ok(planned);
@@ -34,7 +49,7 @@ pub fn replan(
     let mut options = options.clone();
     for allowance in ALLOWANCES {
         options.settings.corner_allowance = allowance;
-        let mut planned = replan_as_set(input, &options, &stop, &mut watch)?;
+        let mut planned = replan_as_set(input, &options, again(&mut qpu), &stop, &mut watch)?;
         least = least.min(planned.inserted.len());
         if planned.inserted.len() <= most {
             planned.before.warnings.push(format!(
@@ -47,4 +62,12 @@ pub fn replan(
         }
     }
     Err(ReplanError::TooManyWaypoints { most, least })
+}
+
+/// A reborrow that ends with one attempt.
+fn again<'a>(qpu: &'a mut Option<&mut dyn Qpu>) -> Option<&'a mut dyn Qpu> {
+    match qpu {
+        Some(qpu) => Some(&mut **qpu),
+        None => None,
+    }
 }

@@ -24,7 +24,7 @@ use crate::geodesy::{LatLon, Zone};
 use crate::mission::{Autopilot, FlightContext, LoiterHabit, Mission};
 use crate::planner::Settings;
 
-pub use fewer::replan;
+pub use fewer::{replan, replan_with};
 pub use field::{Field, FieldError};
 pub use judge::{LegVerdict, Verdict, fields, judge};
 pub use plan::{LegRecord, Progress, Replanned, Stage};

@@ -6,6 +6,7 @@ use super::text::{
     Table, change, clearance, count, duration, finding, leg_label, push_wrapped, unbroken,
 };
 use crate::planner::rounds::Round;
+use crate::qaoa::qpu::QpuUse;
 use crate::replan::{LegRecord, LegVerdict, Replanned, Verdict};
 use crate::units::Metres;
 
@@ -56,9 +57,30 @@ pub fn plan_summary(result: &Replanned, run: &Run<'_>) -> String {
         leg_table(result).push_to(&mut out);
     }
     let notes: Vec<String> = result.notes.iter().map(ToString::to_string).collect();
+    if let Some(used) = &result.qpu {
+        out.push('\n');
+        push_wrapped(&mut out, &qpu_use(used), 4);
+    }
     let fallback = result.fallback();
     remarks(&mut out, fallback, run, before.warnings.iter().chain(&notes));
     out
+}
+
+/// What was used of a QPU.
+fn qpu_use(used: &QpuUse) -> String {
+    let QpuUse { backend, jobs, picked_up, circuits, estimated_seconds, charged_seconds, .. } =
+        used;
+    let backend = if backend.is_empty() { "none" } else { backend };
+    let picked = match picked_up {
+        0 => String::new(),
+        picked => format!(", {picked} of them paid for by an earlier run"),
+    };
+    format!(
+        "QPU {backend}: {} with {}{picked}; {charged_seconds:.0} QPU seconds charged, at most \
+         {estimated_seconds:.0} estimated before.",
+        count(*jobs, "job"),
+        count(*circuits, "circuit"),
+    )
 }
 
 /// The re-planned legs.

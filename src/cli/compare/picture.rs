@@ -115,6 +115,7 @@ mod tests {
             distinct: 7,
             length_m: 100.0,
             improved: true,
+            qpu: None,
         };
         let quav = Measured {
             method: Method::Quav,

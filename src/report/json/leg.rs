@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::mission::legs::number as item_number;
 use crate::planner::candidates::{Candidate, Source};
-use crate::planner::rounds::{Challenger, Round};
+use crate::planner::rounds::{Challenger, QpuRound, Round};
 use crate::replan::LegVerdict;
 use crate::report::stretch::Stretch;
 
@@ -60,6 +60,9 @@ pub struct RoundDocument {
     pub length_m: f64,
     /// Whether the round replaced the incumbent.
     pub improved: bool,
+    /// What a QPU measured, where one ran the circuit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub qpu: Option<QpuRound>,
 }
 
 /// A candidate path.
@@ -113,6 +116,7 @@ impl From<&Round> for RoundDocument {
             distinct: round.distinct,
             length_m: round.length,
             improved: round.improved,
+            qpu: round.qpu.clone(),
         }
     }
 }

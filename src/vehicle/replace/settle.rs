@@ -135,7 +135,7 @@ pub(super) fn finding(
     if ours && held.len() <= longest && (home_slot..held.len()).all(is_either) {
         return Finding::Mixture;
     }
-    let same = (home_slot..held.len()).filter(|&k| is_same_place(intended, held, k)).count();
+    let same = (home_slot..held.len()).filter(|&k| is_alike(intended, held, k)).count();
     if suspect == Suspect::Ourselves && 2 * same >= held.len() - home_slot.min(held.len()) {
         return Finding::Mangled;
     }
@@ -162,8 +162,16 @@ fn is_at(
     })
 }
 
-fn is_same_place(plan: &[MissionItem], held: &[MissionItem], k: usize) -> bool {
-    plan.get(k).is_some_and(|item| item.command == held[k].command && item.e7() == held[k].e7())
+/// Whether item `k` of what is held is that of `plan` with something wrong about it: of command,
+/// latitude, longitude and altitude, three are the same.
+fn is_alike(plan: &[MissionItem], held: &[MissionItem], k: usize) -> bool {
+    let alike = |item: &MissionItem| {
+        let held = &held[k];
+        let same =
+            [item.command == held.command, item.x == held.x, item.y == held.y, item.z == held.z];
+        same.into_iter().filter(|&same| same).count() >= 3
+    };
+    plan.get(k).is_some_and(alike)
 }
 
 #[cfg(test)]
@@ -182,7 +190,7 @@ mod tests {
             autocontinue: 1,
             params: [0.0; 4],
             x: place,
-            y: 7,
+            y: 7 * place,
             z: 30.0,
         }
     }
