@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use crate::cli::files::FileError;
 use crate::cli::qaoa::QaoaCommandError;
+use crate::config::ConfigError;
 use crate::fence::items::FenceItemError;
 use crate::formats::FormatError;
 use crate::ibm::error::IbmError;
@@ -97,6 +98,7 @@ impl From<IbmError> for CliError {
 }
 
 usage_errors!(
+    ConfigError,
     FileError,
     FormatError,
     FenceItemError,

@@ -9,7 +9,7 @@ use tokio_util::sync::CancellationToken;
 use super::CliError;
 use super::files::{self, out_format};
 use super::flight::Flight;
-use super::options::{PlanningArgs, as_qpu};
+use super::options::{PlanningArgs, VehicleArgs, as_qpu};
 use super::plan::{Delivered, Outcome, planned_scenario};
 use super::progress::Shown;
 use super::signing::SigningArgs;
@@ -18,17 +18,17 @@ use crate::fence::items::decode_fence;
 use crate::formats::Scenario;
 use crate::geodesy::LatLon;
 use crate::ibm::qpu::IbmQpu;
-use crate::link::{ComponentId, Endpoint, Identity, Link, Signer, SystemId, Transport};
+use crate::link::{Endpoint, Link, Signer, Transport};
 use crate::mission::{self, Mission, MissionItem, MissionType};
 use crate::replan::{self, Input, Options, Replanned, replan_with};
-use crate::report::picture::picture;
+use crate::report::Report;
 use crate::stop::Stop;
 use crate::store::Store;
 use crate::vehicle::download::Downloaded;
 use crate::vehicle::numbering::{to_mission, to_vehicle};
 use crate::vehicle::readback::differences;
 use crate::vehicle::replace::{Replacement, WhileArmed, pilots_own, replace, restore, settle};
-use crate::vehicle::{Autopilot, Search, Timing, Vehicle, find};
+use crate::vehicle::{Autopilot, Search, Timing, TransferError, Vehicle, find};
 
 /// How long to wait for the vehicle's home and position.
 const PLACE_PATIENCE: Duration = Duration::from_secs(5);
@@ -46,15 +46,6 @@ pub struct OnceArgs {
     /// Put back the mission (and fence) that the vehicle held before quavd wrote to it, and exit.
     #[arg(long, conflicts_with_all = ["dry_run", "out"])]
     pub restore: bool,
-    /// The vehicle's system id, where several are on the link.
-    #[arg(long, value_parser = clap::value_parser!(u8).range(1..))]
-    pub system: Option<u8>,
-    /// quavd's own component id on the vehicle.
-    #[arg(long, default_value_t = 195, value_parser = clap::value_parser!(u8).range(2..))]
-    pub component: u8,
-    /// How long to wait for the vehicle's first heartbeat, seconds.
-    #[arg(long, default_value_t = 15, value_parser = clap::value_parser!(u16).range(1..), value_name = "S")]
-    pub wait: u16,
     /// Also write to an armed vehicle: only items after the one it flies to, to an ArduPilot only
     /// while it does not fly its mission, and only if the way to that item is clear.
     #[arg(long)]
@@ -65,14 +56,14 @@ pub struct OnceArgs {
     /// The vehicle is a simulation that runs this many times faster: so do all waiting times.
     #[arg(long, default_value_t = 1.0, value_parser = speedup, value_name = "X")]
     pub speedup: f64,
-    /// Where originals and upload records are kept.
-    #[arg(long, env = "STATE_DIRECTORY", value_name = "DIR")]
-    pub state_dir: Option<PathBuf>,
+    /// Which vehicle.
+    #[command(flatten)]
+    pub vehicle: VehicleArgs,
     /// Print one JSON document on stdout.
     #[arg(long)]
     pub json: bool,
-    /// Write the result to a file; the suffix gives the format (.plan, .waypoints, .geojson, .kml,
-    /// .svg). May be repeated.
+    /// Write the result to a file; the suffix gives the format (.plan, .waypoints, .fence, .rally,
+    /// .fen, .geojson, .kml, .kmz; .svg, .png or .html to look at). May be repeated.
     #[arg(long, value_name = "FILE")]
     pub out: Vec<PathBuf>,
     /// Who is believed.
@@ -87,12 +78,6 @@ fn speedup(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if (0.1..=100.0).contains(&value) => Ok(value),
         _ => Err(format!("'{text}' is not a number from 0.1 to 100")),
-    }
-}
-
-impl OnceArgs {
-    fn while_armed(&self) -> WhileArmed {
-        if self.in_flight { WhileArmed::Allow } else { WhileArmed::Refuse }
     }
 }
 
@@ -114,14 +99,10 @@ pub fn run(args: OnceArgs, shown: &Shown) -> Result<String, CliError> {
         shown.doing(format!("connecting to {}", args.connect));
         let mut transport = Transport::open(&args.connect).await?;
         if let Some(settings) = args.signing.settings() {
-            let state = state_directory(args.state_dir.as_ref())?;
-            transport = transport.signed(Signer::open(&settings, &state)?);
+            transport =
+                transport.signed(Signer::open(&settings, &args.vehicle.state_directory()?)?);
         }
-        let identity = Identity {
-            system: SystemId(args.system.unwrap_or(1)),
-            component: ComponentId(args.component),
-        };
-        let (link, task) = Link::start(transport, identity, cancel);
+        let (link, task) = Link::start(transport, args.vehicle.identity(), cancel);
         let outcome = with_link(&args, &link, shown).await;
         shown.clear();
         task.close().await;
@@ -130,14 +111,10 @@ pub fn run(args: OnceArgs, shown: &Shown) -> Result<String, CliError> {
 }
 
 async fn with_link(args: &OnceArgs, link: &Link, shown: &Shown) -> Result<String, CliError> {
-    let store = Store::open(&state_directory(args.state_dir.as_ref())?)?;
+    let store = Store::open(&args.vehicle.state_directory()?)?;
     shown.doing("waiting for the vehicle");
-    let search = Search {
-        system: args.system.map(SystemId),
-        patience: Duration::from_secs(u64::from(args.wait)),
-        timing: Timing::default().faster(args.speedup),
-    };
-    let vehicle = find(link, &search).await?;
+    let timing = Timing::default().faster(args.speedup);
+    let vehicle = find(link, &Search { timing, ..args.vehicle.search() }).await?;
     let outcome = with_vehicle(args, &vehicle, &store, shown).await;
     vehicle.close().await;
     outcome
@@ -150,7 +127,7 @@ async fn with_vehicle(
     shown: &Shown,
 ) -> Result<String, CliError> {
     let mut on_step = |step| shown.step(step);
-    let while_armed = args.while_armed();
+    let while_armed = if args.in_flight { WhileArmed::Allow } else { WhileArmed::Refuse };
     if args.restore {
         return put_back(vehicle, store, while_armed, shown).await;
     }
@@ -165,7 +142,9 @@ async fn with_vehicle(
     }
 
     let began = Instant::now();
-    let read = read(vehicle, store, args, shown).await?;
+    let held = Held::download(vehicle, shown).await?;
+    let mut read = read(vehicle, store, &args.planning, held, shown).await?;
+    let flight = if args.in_flight { in_flight(vehicle, &mut read)? } else { None };
     shown.warn(&read.scenario.warnings);
     let options = args.planning.options();
     if read.scenario.mission.items.is_empty() {
@@ -174,7 +153,7 @@ async fn with_vehicle(
         ));
     }
     let load = began.elapsed();
-    let qpu = args.planning.qpu(args.state_dir.as_ref())?;
+    let qpu = args.planning.qpu(args.vehicle.state_dir.as_ref())?;
     let planned = plan_off_thread(&read, &options, qpu, shown).await;
     let warnings = &read.scenario.warnings;
     let total = began.elapsed();
@@ -184,11 +163,11 @@ async fn with_vehicle(
     if let Ok(planned) = &outcome.planned {
         let home_slot =
             (vehicle.autopilot() == Autopilot::ArduPilot).then(|| read.held.first()).flatten();
-        let mission = match &read.flight {
+        let mission = match &flight {
             Some(flight) => flight.with(planned)?,
             None => planned.mission.clone(),
         };
-        let intended = match (planned.is_changed(), &read.flight) {
+        let intended = match (planned.is_changed(), &flight) {
             (true, _) => to_vehicle(vehicle.autopilot(), &mission, home_slot),
             (false, Some(_)) => read.held.clone(),
             (false, None) => read.original.clone(),
@@ -208,11 +187,25 @@ async fn with_vehicle(
             done = Delivery { written: true, verified: true };
         }
         shown.clear();
-        files::write_all(&args.out, &planned_scenario(&read.scenario, planned), || {
-            picture(planned, &outcome.run(), &format!("mission of {}", args.connect))
-        })?;
+        let title = format!("mission of {}", args.connect);
+        let report = Report::planned(planned, outcome.run(), &title, &read.scenario.fences);
+        files::write_all(&args.out, &planned_scenario(&read.scenario, planned), &report)?;
     }
     outcome.told(args.json, Some(done.told(vehicle, args.dry_run)))
+}
+
+/// Where the vehicle is armed: only the rest of what it flies is to be planned, from where it is.
+fn in_flight(vehicle: &Vehicle, read: &mut Read) -> Result<Option<Flight>, CliError> {
+    let state = vehicle.state();
+    if !state.is_armed() {
+        return Ok(None);
+    }
+    // What the vehicle flies is what it holds, whatever that was made from.
+    let flown = to_mission(vehicle.autopilot(), &read.held, state.home);
+    let flight = Flight::of(&state, vehicle.autopilot(), flown)?;
+    read.scenario.mission = flight.rest.clone();
+    read.start = Some(flight.position);
+    Ok(Some(flight))
 }
 
 /// Whether the vehicle has room for a mission, as far as that was told.
@@ -246,64 +239,72 @@ async fn put_back(
 }
 
 /// What was read from a vehicle.
-struct Read {
+pub(crate) struct Read {
     /// The pilot's mission, the fences with those of the command line, the rally points.
-    scenario: Scenario,
+    pub(crate) scenario: Scenario,
     /// The mission list that the vehicle holds, in its numbering.
-    held: Vec<MissionItem>,
+    pub(crate) held: Vec<MissionItem>,
     /// The pilot's own mission list: what is held, or what quavd's last upload was made from.
-    original: Vec<MissionItem>,
-    start: Option<LatLon>,
-    rally: Vec<LatLon>,
-    autopilot: mission::Autopilot,
-    /// Where the vehicle is armed and may be written to all the same; the scenario's mission is
-    /// then only the rest of what it flies.
-    flight: Option<Flight>,
+    pub(crate) original: Vec<MissionItem>,
+    pub(crate) start: Option<LatLon>,
+    pub(crate) rally: Vec<LatLon>,
+    pub(crate) autopilot: mission::Autopilot,
 }
 
-async fn read(
+/// The three plans of a vehicle, as downloaded.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Held {
+    pub(crate) mission: Vec<MissionItem>,
+    pub(crate) fence: Vec<MissionItem>,
+    pub(crate) rally: Vec<MissionItem>,
+    /// Which of them came in another way than was tried first, and why.
+    pub(crate) fell_back: Vec<String>,
+}
+
+impl Held {
+    /// Downloads all three.
+    pub(crate) async fn download(vehicle: &Vehicle, shown: &Shown) -> Result<Self, TransferError> {
+        let mut on_progress = |progress| shown.transfer(progress);
+        let mission = vehicle.read_plan(MissionType::Mission, &mut on_progress).await?;
+        let fence = vehicle.read_plan(MissionType::Fence, &mut on_progress).await?;
+        let rally = vehicle.read_plan(MissionType::Rally, &mut on_progress).await?;
+        let fell_back = [&mission, &fence, &rally].into_iter().filter_map(Downloaded::fell_back);
+        Ok(Self {
+            fell_back: fell_back.collect(),
+            mission: mission.items,
+            fence: fence.items,
+            rally: rally.items,
+        })
+    }
+}
+
+/// What the plans of a vehicle mean, with what else planning starts from.
+pub(crate) async fn read(
     vehicle: &Vehicle,
     store: &Store,
-    args: &OnceArgs,
+    planning: &PlanningArgs,
+    held: Held,
     shown: &Shown,
 ) -> Result<Read, CliError> {
-    let mut on_progress = |progress| shown.transfer(progress);
-    let mission = vehicle.read_plan(MissionType::Mission, &mut on_progress).await?;
-    let fence = vehicle.read_plan(MissionType::Fence, &mut on_progress).await?;
-    let rally = vehicle.read_plan(MissionType::Rally, &mut on_progress).await?;
-    let fell_back: Vec<String> =
-        [&mission, &fence, &rally].into_iter().filter_map(Downloaded::fell_back).collect();
-    let (held, fence, rally) = (mission.items, fence.items, rally.items);
     shown.doing("waiting for the vehicle's home and position");
     let known =
         |state: &crate::vehicle::VehicleState| state.home.is_some() && state.position.is_some();
-    let _ = vehicle.wait_for(PLACE_PATIENCE.div_f64(args.speedup), known).await;
+    let _ = vehicle.wait_for(PLACE_PATIENCE, known).await;
     let state = vehicle.state();
 
+    let Held { mission: held, fence, rally, fell_back } = held;
     let original = pilots_own(vehicle, store, MissionType::Mission, &held).await?;
-    let mut mission = to_mission(vehicle.autopilot(), &original, state.home);
-    let flight = if state.is_armed() && args.in_flight {
-        // What the vehicle flies is what it holds, whatever that was made from.
-        let flown = to_mission(vehicle.autopilot(), &held, state.home);
-        Some(Flight::of(&state, vehicle.autopilot(), flown)?)
-    } else {
-        None
-    };
-    if let Some(flight) = &flight {
-        mission = flight.rest.clone();
-    }
+    let mission = to_mission(vehicle.autopilot(), &original, state.home);
     let decoded = decode_fence(&fence, None)?;
     let (mut fences, mut warnings) = (decoded.fences, fell_back);
     warnings.extend(decoded.warnings);
-    files::add_fences(&mut fences, &mut warnings, &args.planning.safety)?;
+    files::add_fences(&mut fences, &mut warnings, &planning.safety)?;
     let places = rally_places(&rally)?;
     // The vehicle stands at home before it takes off; in flight its own place counts.
-    let position = flight.as_ref().map(|flight| flight.position);
-    let position = position.or(state.position.map(|at| at.position));
-    let start = position.or(mission.home.map(|home| home.position));
+    let start = state.position.map(|at| at.position).or(mission.home.map(|home| home.position));
     let scenario = Scenario { mission, fences, rally, warnings, ..Scenario::default() };
     let autopilot = vehicle.autopilot().into();
-    Ok(Read { scenario, held, original, start, rally: places, autopilot, flight })
+    Ok(Read { scenario, held, original, start, rally: places, autopilot })
 }
 
 /// The places of rally points.
@@ -383,18 +384,4 @@ impl Delivery {
             note,
         }
     }
-}
-
-/// Where records are kept: the option (or systemd's `STATE_DIRECTORY`), else the user's state
-/// directory.
-pub(super) fn state_directory(chosen: Option<&PathBuf>) -> Result<PathBuf, CliError> {
-    if let Some(path) = chosen {
-        return Ok(path.clone());
-    }
-    let base = std::env::var_os("XDG_STATE_HOME")
-        .map(PathBuf::from)
-        .filter(|path| path.is_absolute())
-        .or_else(|| std::env::home_dir().map(|home| home.join(".local/state")));
-    base.map(|base| base.join("quavd"))
-        .ok_or_else(|| CliError::Usage("no place for records: give --state-dir DIR".to_owned()))
 }

@@ -6,17 +6,18 @@ use std::time::Duration;
 use clap::Args;
 
 use super::ibm::account::AccountArgs;
-use super::once::state_directory;
 use super::{CliError, memory};
 use crate::airspace::InclusionRule;
 use crate::geodesy::Zone;
 use crate::ibm::client::backends::BackendChoice;
 use crate::ibm::qpu::IbmQpu;
+use crate::link::{ComponentId, Identity, SystemId};
 use crate::planner::{CandidateSource, QpuSettings, QpuTraining, Rounds, Settings};
 use crate::qaoa::qpu::Qpu;
 use crate::qaoa::{EngineChoice, EngineKind};
 use crate::replan::Options;
 use crate::units::Metres;
+use crate::vehicle::Search;
 
 /// Distances to keep and fences to respect, for planning and checking.
 #[derive(Debug, Clone, Args)]
@@ -71,6 +72,14 @@ fn lambda(text: &str) -> Result<f64, String> {
     number(text, 0.0, 1000.0)
 }
 
+/// The share of measurements that CVaR looks at.
+///
+/// # Errors
+/// What a user should give instead.
+pub(super) fn cvar(text: &str) -> Result<f64, String> {
+    number(text, 0.001, 1.0)
+}
+
 fn deadline(text: &str) -> Result<f64, String> {
     number(text, 0.001, 1e6)
 }
@@ -79,13 +88,73 @@ fn learning_rate(text: &str) -> Result<f64, String> {
     number(text, 1e-6, 10.0)
 }
 
+/// Which vehicle, who quavd is on it, and where its plans are kept safe.
+#[derive(Debug, Clone, Args)]
+pub struct VehicleArgs {
+    /// The vehicle's system id, where several are on the link.
+    #[arg(long, value_parser = clap::value_parser!(u8).range(1..), value_name = "ID")]
+    pub system: Option<u8>,
+    /// quavd's own component id on the vehicle.
+    #[arg(long, default_value_t = 195, value_parser = clap::value_parser!(u8).range(2..), value_name = "ID")]
+    pub component: u8,
+    /// How long to wait for the vehicle's first heartbeat, seconds.
+    #[arg(long, default_value_t = 15, value_parser = clap::value_parser!(u16).range(1..), value_name = "S")]
+    pub wait: u16,
+    /// Where originals and upload records are kept.
+    #[arg(long, env = "STATE_DIRECTORY", value_name = "DIR")]
+    pub state_dir: Option<PathBuf>,
+}
+
+impl VehicleArgs {
+    /// Who quavd is.
+    #[must_use]
+    pub fn identity(&self) -> Identity {
+        Identity {
+            system: SystemId(self.system.unwrap_or(1)),
+            component: ComponentId(self.component),
+        }
+    }
+
+    /// Whom to look for, and for how long.
+    #[must_use]
+    pub fn search(&self) -> Search {
+        Search {
+            system: self.system.map(SystemId),
+            patience: Duration::from_secs(u64::from(self.wait)),
+            ..Search::default()
+        }
+    }
+
+    /// Where records are kept.
+    ///
+    /// # Errors
+    /// [`CliError::Usage`] where no place is given and the user has no home.
+    pub fn state_directory(&self) -> Result<PathBuf, CliError> {
+        state_directory(self.state_dir.as_ref())
+    }
+}
+
+/// The option (or systemd's `STATE_DIRECTORY`), else the user's state directory.
+pub(super) fn state_directory(chosen: Option<&PathBuf>) -> Result<PathBuf, CliError> {
+    if let Some(path) = chosen {
+        return Ok(path.clone());
+    }
+    let base = std::env::var_os("XDG_STATE_HOME")
+        .map(PathBuf::from)
+        .filter(|path| path.is_absolute())
+        .or_else(|| std::env::home_dir().map(|home| home.join(".local/state")));
+    base.map(|base| base.join("quavd"))
+        .ok_or_else(|| CliError::Usage("no place for records: give --state-dir DIR".to_owned()))
+}
+
 /// How to plan.
 #[derive(Debug, Clone, Args)]
 pub struct PlanningArgs {
     /// Distances and fences.
     #[command(flatten)]
     pub safety: SafetyArgs,
-    /// Edges of a leg's path, one qubit each; legs with more corners get more.
+    /// Edges of a leg's path, one qubit each. Legs with more corners get more; engines other than
+    /// chain then take them in windows of this many qubits.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u16).range(2..=2000))]
     pub qubits: u16,
     /// QAOA layers.
@@ -97,6 +166,10 @@ pub struct PlanningArgs {
     /// Adam's learning rate.
     #[arg(long, default_value_t = 0.1, value_parser = learning_rate)]
     pub learning_rate: f64,
+    /// Train on the mean of this share of the best measurements (CVaR) instead of ⟨H⟩: exact with the
+    /// statevector engine, estimated from --shots samples at every step with the chain engine.
+    #[arg(long, value_parser = cvar, value_name = "ALPHA")]
+    pub cvar: Option<f64>,
     /// Shots of each QAOA run.
     #[arg(long, default_value_t = 1024, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub shots: u32,
@@ -129,7 +202,7 @@ pub struct PlanningArgs {
     pub deadline: Option<f64>,
     /// Exactly the settings of the paper's table: 20 qubits, 5 layers, 60 Adam steps at 0.1 in
     /// every round, 5 m buffer, grid candidates.
-    #[arg(long, conflicts_with_all = ["buffer", "qubits", "layers", "steps", "learning_rate", "candidates", "grid"])]
+    #[arg(long, conflicts_with_all = ["buffer", "qubits", "layers", "steps", "learning_rate", "cvar", "candidates", "grid"])]
     pub paper: bool,
     /// On a QPU.
     #[command(flatten)]
@@ -173,7 +246,7 @@ impl QpuArgs {
 }
 
 /// The QPU as the planner takes it.
-pub(super) fn as_qpu(qpu: &mut Option<IbmQpu>) -> Option<&mut dyn Qpu> {
+pub(crate) fn as_qpu(qpu: &mut Option<IbmQpu>) -> Option<&mut dyn Qpu> {
     qpu.as_mut().map(|qpu| qpu as &mut dyn Qpu)
 }
 
@@ -217,6 +290,7 @@ impl PlanningArgs {
             layers: usize::from(self.layers),
             steps: self.steps as usize,
             learning_rate: self.learning_rate,
+            cvar: self.cvar,
             grid: Metres(self.grid),
             source: self.candidates,
             ..Settings::default()

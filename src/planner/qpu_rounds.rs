@@ -18,7 +18,9 @@ use crate::geodesy::Xy;
 use crate::qaoa::qpu::{
     JobPlan, Measured, Qpu, QpuCircuit, Use, circuits_of_a_step, run_of, train_on_qpu,
 };
-use crate::qaoa::{Angles, AnglesSource, ChainIsing, EngineError, QaoaRun, RunSettings, Scale};
+use crate::qaoa::{
+    Angles, AnglesSource, ChainIsing, EngineError, Objective, QaoaRun, RunSettings, Scale,
+};
 use crate::stop::{Stop, Stopped};
 
 /// The share of the time until the deadline that is kept for the local engine.
@@ -32,7 +34,9 @@ struct Trained {
     pair: Pair,
     chain: ChainIsing,
     angles: Angles,
-    /// ⟨H⟩ of each step, metres.
+    /// What the training lowered, and whether that was estimated from samples.
+    objective: (Objective, bool),
+    /// Its value at each step, metres.
     loss: Vec<f64>,
     loss_errors: Vec<f64>,
     /// ⟨H⟩ at the angles without errors, metres.
@@ -131,7 +135,7 @@ impl Contest<'_> {
             let backend = qpu.used().backend;
             for (one, measured) in trained.into_iter().zip(measured) {
                 let (pair, run, round) = decided(one, measured, &backend, trains);
-                champion = champion.min(self.decide(&pair, run, Some(round), champion, watch));
+                champion = champion.min(self.decide(&pair, run, Some(round), champion, watch).cost);
             }
             let gained = before - self.cost(&self.incumbent);
             idle = if gained > PROGRESS * before { 0 } else { idle + 1 };
@@ -164,7 +168,7 @@ impl Contest<'_> {
         while pairs.len() < circuits
             && let Some(route) = routes.pop_front()
         {
-            pairs.extend(self.pair(Challenger::Route, &self.incumbent, &route)?);
+            pairs.extend(self.pairs_of(Challenger::Route, &self.incumbent, &route)?);
         }
         for _ in 0..PROPOSALS * circuits {
             if pairs.len() >= circuits {
@@ -172,9 +176,11 @@ impl Contest<'_> {
             }
             let moves = moves(&self.incumbent, &self.judge, progress, self.room(), &mut self.rng);
             if moves.from != moves.to {
-                pairs.extend(self.pair(Challenger::Refinement, &moves.from, &moves.to)?);
+                pairs.extend(self.pairs_of(Challenger::Refinement, &moves.from, &moves.to)?);
             }
         }
+        // A long chain is several circuits; a job has no more than it was planned with.
+        pairs.truncate(circuits);
         Ok(pairs)
     }
 
@@ -213,10 +219,15 @@ impl Contest<'_> {
         };
         let run = self.qaoa.run(&pair.ising, &local, stop)?;
         self.angles[kind] = Some(run.angles.clone());
+        let objective = match &losses {
+            None => (run.objective, run.loss_is_sampled),
+            Some(_) => (Objective::Mean, true),
+        };
         let (loss, loss_errors) = losses.unwrap_or((run.loss, Vec::new()));
         Ok(Trained {
             chain,
             angles: run.angles,
+            objective,
             loss,
             loss_errors,
             ideal: run.expectation,
@@ -233,7 +244,9 @@ fn decided(
     backend: &str,
     trained_on_qpu: bool,
 ) -> (Pair, QaoaRun, QpuRound) {
-    let Trained { pair, angles, mut loss, mut loss_errors, ideal, exact_optimum, .. } = trained;
+    let Trained {
+        pair, angles, objective, mut loss, mut loss_errors, ideal, exact_optimum, ..
+    } = trained;
     let scaled = pair.ising.scaled(Scale::Sigma);
     let metres = |energy: f64| scaled.in_input_units(energy);
     let expectation = metres(measured.expectation);
@@ -251,6 +264,7 @@ fn decided(
         ideal_expectation: ideal,
         loss_errors,
     };
-    let run = run_of(&pair.ising, angles, loss, exact_optimum, measured);
+    let mut run = run_of(&pair.ising, angles, loss, exact_optimum, measured);
+    (run.objective, run.loss_is_sampled) = objective;
     (pair, run, round)
 }

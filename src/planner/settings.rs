@@ -126,6 +126,8 @@ pub struct Settings {
     pub steps: usize,
     /// Adam's learning rate (paper: 0.1).
     pub learning_rate: f64,
+    /// Train on the mean of this share of the best measurements instead of ⟨H⟩ (CVaR).
+    pub cvar: Option<f64>,
     /// Shots of each run.
     pub shots: u32,
     /// QAOA runs for each leg.
@@ -162,6 +164,7 @@ impl Default for Settings {
             layers: 5,
             steps: 60,
             learning_rate: 0.1,
+            cvar: None,
             shots: 1024,
             rounds: Rounds::Auto,
             seed: 0,

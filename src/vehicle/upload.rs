@@ -79,6 +79,7 @@ impl Vehicle {
             items,
             goes_on,
             busy_habit,
+            ends_told: 0,
             count,
             last_sent: None,
             tries: 0,
@@ -89,6 +90,9 @@ impl Vehicle {
         Ok(uploaded)
     }
 }
+
+/// How often the end of a download is told again to a busy PX4.
+const ENDS: u32 = 4;
 
 /// What to do when the vehicle is busy with somebody else's upload.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -109,6 +113,8 @@ struct Upload<'a, 'v> {
     items: &'a [MissionItem],
     goes_on: GoesOn<'a>,
     busy_habit: BusyHabit,
+    /// How often the end of the last download was told again.
+    ends_told: u32,
     count: u16,
     /// The furthest item that the vehicle asked for and was sent.
     last_sent: Option<u16>,
@@ -205,13 +211,7 @@ impl Upload<'_, '_> {
     async fn send_item(&mut self, seq: u16) -> Result<(), TransferError> {
         let Some(&item) = self.items.get(usize::from(seq)) else { return Ok(()) };
         if !(self.goes_on)(&self.exchange.vehicle.state()) {
-            let cancelled = MissionAck {
-                target: self.exchange.target(),
-                result: MissionResult::OPERATION_CANCELLED.0,
-                mission_type: self.exchange.wire_type(),
-                opaque_id: 0,
-            };
-            self.exchange.send(&cancelled).await?;
+            self.acknowledge(MissionResult::OPERATION_CANCELLED).await?;
             return Err(TransferError::CalledOff { mission_type: self.exchange.mission_type });
         }
         let message = MissionItemInt {
@@ -232,6 +232,16 @@ impl Upload<'_, '_> {
             self.tries += 1;
         }
         Ok(())
+    }
+
+    async fn acknowledge(&self, result: MissionResult) -> Result<(), TransferError> {
+        let ack = MissionAck {
+            target: self.exchange.target(),
+            result: result.0,
+            mission_type: self.exchange.wire_type(),
+            opaque_id: 0,
+        };
+        self.exchange.send(&ack).await
     }
 
     /// Whether an item is marked as the current one. ArduPilot takes other marks than 0 for orders
@@ -286,6 +296,12 @@ impl Upload<'_, '_> {
             MissionResult::OPERATION_CANCELLED if self.last_sent.is_none() => Ok(Next::Wait),
             MissionResult::DENIED if self.last_sent.is_some() => Ok(Next::Wait),
             result if self.last_sent.is_none() && self.means_busy(result) => {
+                // PX4 is busy with our own last download where the end of that was lost.
+                if self.exchange.vehicle.autopilot == Autopilot::Px4 && self.ends_told < ENDS {
+                    self.ends_told += 1;
+                    self.acknowledge(MissionResult::ACCEPTED).await?;
+                    return Ok(Next::Offer);
+                }
                 if self.busy_habit == BusyHabit::End {
                     let mission_type = self.exchange.mission_type;
                     let busy = TransferError::Busy { mission_type, waited: Duration::ZERO };

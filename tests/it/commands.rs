@@ -8,7 +8,7 @@ use quav::mission::MissionType;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use crate::sitl::{FakeVehicle, PERSONAS, python};
+use crate::sitl::{FakeVehicle, PERSONAS};
 
 /// The scenarios with their exact shortest lengths, metres: bracketed from both sides to 1 cm by
 /// a solver that is not part of quavd.
@@ -53,15 +53,6 @@ impl Field {
         arguments.extend(more);
         quavd(&arguments)
     }
-
-    /// What the vehicle holds, by the measure of `judge.py`.
-    fn judged(&mut self) -> Value {
-        let dump = self.state.path().join("dump.json");
-        std::fs::write(&dump, self.vehicle.dump().to_string()).unwrap();
-        let output = Command::new(python()).arg(root("sitl/judge.py")).arg(&dump).output().unwrap();
-        serde_json::from_slice(&output.stdout)
-            .unwrap_or_else(|_| panic!("{}", String::from_utf8_lossy(&output.stderr)))
-    }
 }
 
 fn stdout_json(output: &Output) -> Value {
@@ -85,7 +76,7 @@ fn all_six_over(link: &str, persona: &str) {
             "{what}: {}",
             String::from_utf8_lossy(&output.stderr)
         );
-        let verdict = field.judged();
+        let verdict = field.vehicle.judged();
         assert_eq!(verdict["collisions"], 0, "{what}: {verdict}");
         assert!(verdict["min_clearance_m"].as_f64().unwrap() >= 4.99, "{what}: {verdict}");
         assert!(verdict["length_m"].as_f64().unwrap() <= 1.05 * exact, "{what}: {verdict}");
@@ -259,7 +250,7 @@ fn in_flight_the_rest_of_the_mission_is_planned_and_the_vehicle_flies_on() {
         let errors = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(0), "{persona}: {errors}");
         assert_eq!(stdout_json(&output)["vehicle"]["uploaded"], true);
-        assert_eq!(field.judged()["collisions"], 0, "{persona}");
+        assert_eq!(field.vehicle.judged()["collisions"], 0, "{persona}");
         assert_eq!(field.vehicle.dump()["current_seq"], current, "{persona}");
     }
 }
@@ -309,7 +300,7 @@ fn a_vehicle_with_little_room_is_refused_with_5_or_gets_fewer_waypoints() {
         Some(0) => {
             let said = stdout_json(&output);
             assert!(said["warnings"].to_string().contains("corners were merged"), "{said}");
-            assert_eq!(field.judged()["collisions"], 0);
+            assert_eq!(field.vehicle.judged()["collisions"], 0);
         }
         Some(3) => assert!(errors.contains("inserted waypoints was found"), "{errors}"),
         code => panic!("{code:?}: {errors}"),

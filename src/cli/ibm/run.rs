@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use serde_json::json;
 
-use super::super::once::state_directory;
+use super::super::options::state_directory;
 use super::super::qaoa::{document, read, summary};
 use super::super::{CliError, memory};
 use super::account::AccountArgs;
@@ -93,7 +93,7 @@ pub(super) fn run(args: &RunArgs) -> Result<String, CliError> {
             Some(trained) => AnglesSource::Given(trained.angles.clone()),
             None => AnglesSource::Ramp(layers),
         },
-        train: TrainSettings { steps, learning_rate: rate, settled: None },
+        train: TrainSettings { steps, learning_rate: rate, ..TrainSettings::default() },
         shots: 0,
         ..RunSettings::default()
     };

@@ -22,6 +22,8 @@ pub struct SettingsDocument {
     pub steps: usize,
     /// Adam's learning rate.
     pub learning_rate: f64,
+    /// The share of the best measurements that training looks at; `null`: all, ⟨H⟩.
+    pub cvar: Option<f64>,
     /// Shots of each run.
     pub shots: u32,
     /// `auto` or the most rounds of a leg.
@@ -58,6 +60,7 @@ impl From<&Options> for SettingsDocument {
             layers: settings.layers,
             steps: settings.steps,
             learning_rate: settings.learning_rate,
+            cvar: settings.cvar,
             shots: settings.shots,
             rounds: match settings.rounds {
                 Rounds::Auto => "auto".to_owned(),

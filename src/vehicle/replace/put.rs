@@ -40,6 +40,7 @@ impl Putting<'_> {
         let timing = &self.vehicle.timing;
         let mut restarts = 0;
         let mut busy_since = None;
+        let mut busy_answers = 0;
         // Until an upload has been begun, the vehicle holds what it held, or somebody else's plan.
         let mut is_begun = self.what == What::Old;
         let mut unproven = false;
@@ -56,7 +57,9 @@ impl Putting<'_> {
                 },
                 Err(Setback::Again(error @ TransferError::Busy { .. })) => {
                     let since = *busy_since.get_or_insert_with(Instant::now);
-                    if since.elapsed() >= timing.busy {
+                    busy_answers += 1;
+                    // Looking at the plan between two answers can take longer than that alone.
+                    if busy_answers > timing.retries && since.elapsed() >= timing.busy {
                         let (mission_type, waited) = (self.record.mission_type, since.elapsed());
                         return Err(TransferError::Busy { mission_type, waited }.into());
                     }
