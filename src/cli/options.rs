@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::memory;
-use crate::airspace::InclusionRule;
+use crate::fence::InclusionRule;
 use crate::geodesy::Zone;
 use crate::planner::{CandidateSource, Rounds, Settings};
 use crate::qaoa::EngineChoice;
-use crate::replan::Options;
+use crate::replan::{Options, Vertical};
 use crate::units::Metres;
 
 /// Distances to keep and fences to respect, for planning and checking.
@@ -21,9 +21,18 @@ pub struct SafetyArgs {
     /// Zone of the projection: auto (of each leg), or EPSG:n (UTM or UPS).
     #[arg(long, default_value = "auto", value_parser = zone, value_name = "ZONE")]
     pub zone: ZoneChoice,
-    /// What several inclusion fences mean: inside all of them, or any.
-    #[arg(long, default_value_t = InclusionRule::All, value_name = "all|any")]
-    pub inclusion: InclusionRule,
+    /// What several inclusion fences mean: inside all of them, or any. auto: as the vehicle has
+    /// it (ArduPilot's FENCE_OPTIONS), all of them for files.
+    #[arg(long, default_value = "auto", value_parser = inclusion, value_name = "auto|all|any")]
+    pub inclusion: InclusionChoice,
+    /// Vertical distance to keep from an obstacle with a height, to be flown over or under it,
+    /// metres.
+    #[arg(long, default_value_t = 10.0, value_parser = vertical, value_name = "M")]
+    pub vertical_margin: f64,
+    /// The ground at any obstacle is at most this many metres above or below home. Only with this
+    /// are heights above ground compared with altitudes above home.
+    #[arg(long, value_parser = vertical, value_name = "M")]
+    pub ground_relief: Option<f64>,
     /// More fences from a file (.plan, waypoints, GeoJSON, KML, fence text); may be repeated.
     #[arg(long, value_name = "FILE")]
     pub fence: Vec<PathBuf>,
@@ -35,6 +44,21 @@ pub struct SafetyArgs {
 /// `auto` or a zone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ZoneChoice(pub Option<Zone>);
+
+/// `auto` or a rule.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct InclusionChoice(pub Option<InclusionRule>);
+
+fn inclusion(text: &str) -> Result<InclusionChoice, String> {
+    match text {
+        "auto" => Ok(InclusionChoice(None)),
+        text => text.parse().map(|rule| InclusionChoice(Some(rule))),
+    }
+}
+
+fn vertical(text: &str) -> Result<f64, String> {
+    number(text, 0.0, 10_000.0)
+}
 
 fn zone(text: &str) -> Result<ZoneChoice, String> {
     match text {
@@ -120,7 +144,16 @@ impl SafetyArgs {
     #[must_use]
     pub fn options(&self) -> Options {
         let settings = Settings { buffer: Metres(self.buffer), ..Settings::default() };
-        Options { settings, zone: self.zone.0, inclusion: self.inclusion }
+        Options {
+            settings,
+            zone: self.zone.0,
+            inclusion: self.inclusion.0.unwrap_or_default(),
+            vertical: Vertical {
+                margin: Metres(self.vertical_margin),
+                ground_relief: self.ground_relief.map(Metres),
+            },
+            ..Options::default()
+        }
     }
 }
 

@@ -2,13 +2,18 @@
 //!
 //! A [`FenceSet`] is still geographic and unbuffered. Turning it into something a path can be
 //! tested against is [`crate::airspace`]'s work. [`items`] reads and writes the fence plan items that
-//! vehicles and files hold.
+//! vehicles and files hold; [`rules`] is what a vehicle's parameters say about its fence besides;
+//! [`height`] is how high a region reaches.
 
+pub mod height;
 pub mod items;
+pub mod rules;
 #[cfg(test)]
 pub(crate) mod samples;
 
+pub use height::{HeightRange, HeightReference};
 pub use items::{DecodedFence, FenceItemError, decode_fence, encode_fence};
+pub use rules::{InclusionRule, Limit, Limits, VehicleRules};
 
 use crate::geodesy::LatLon;
 use crate::units::Metres;
@@ -43,6 +48,8 @@ pub struct FenceRegion {
     pub role: FenceRole,
     /// Its outline.
     pub shape: FenceShape,
+    /// How high it reaches; `None`: it counts at all altitudes.
+    pub heights: Option<HeightRange>,
     /// What to call it in a message, such as `fence items 4-9` or `city.geojson feature 3`.
     pub origin: String,
 }

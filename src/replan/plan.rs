@@ -4,10 +4,11 @@ use std::collections::BTreeSet;
 use std::sync::atomic::AtomicBool;
 
 use super::field::{Field, Fields};
-use super::judge::{Verdict, can_be_replanned, judge, verdict};
+use super::judge::{LegVerdict, Verdict, can_be_replanned, judge, verdict};
 use super::reason::ReplanError;
 use super::{Input, Options};
 use crate::geodesy::{LatLonE7, Xy, Zone};
+use crate::mission::legs::LegShape;
 use crate::mission::splice::SpliceNote;
 use crate::mission::{Detour, Leg, Mission, legs, splice};
 use crate::planner::candidates::Candidate;
@@ -93,9 +94,9 @@ pub fn replan(
     cancelled: &AtomicBool,
     mut watch: impl FnMut(Progress<'_>),
 ) -> Result<Replanned, ReplanError> {
-    let flown = legs(input.mission, &input.context())?;
-    let fields = Fields::new(&flown.legs, input.fences, options)?;
-    let before = verdict(&flown, &fields, input, options)?;
+    let flown = legs(input.mission, &input.context(options.loiter))?;
+    let fields = Fields::new(&flown.legs, input, options)?;
+    let before = verdict(&flown, &fields, options)?;
     let blocked = legs_to_replan(&before)?;
 
     let mut planner = LegPlanner::new(options.settings.clone());
@@ -105,29 +106,31 @@ pub fn replan(
         let leg = &flown.legs[index];
         let name = leg.name().to_string();
         watch(Progress::Leg { number: k + 1, of: blocked.len(), name });
-        let (zone, zoned) = fields
-            .of(leg.from.position, leg.to.position)
+        let view = fields
+            .of(leg)
             .ok_or_else(|| ReplanError::unjudged(leg, "its zone was not prepared"))?;
         let request = LegRequest {
             from: leg.from.position,
             to: leg.to.position,
-            from_reach: leg.from.circle.0 * zoned.spread,
-            to_reach: leg.to.circle.0 * zoned.spread,
+            from_reach: leg.from.circle.0 * view.spread,
+            to_reach: leg.to.circle.0 * view.spread,
         };
-        let space = zoned.leg_space(options.settings.buffer.0, request.from, request.to);
+        let space = view.leg_space(options.settings.buffer.0, request.from, request.to);
         let mut number = 0;
         let outcome = planner
-            .plan(&request, &zoned.frame, &space, cancelled, |round| {
+            .plan(&request, view.frame, &space, cancelled, |round| {
                 number += 1;
                 watch(Progress::Round { number, round });
             })
-            .map_err(|error| ReplanError::from_plan(error, leg, input.fences))?;
+            .map_err(|error| {
+                ReplanError::from_plan(error, leg, &|region| fields.name(region).to_owned())
+            })?;
         if let LegOutcome::Replanned(plan) = outcome {
             let LegPlan { finished, candidates, rounds, times } = *plan;
             detours.push(Detour { leg: index, waypoints: finished.waypoints.clone() });
             records.push(LegRecord {
                 leg: *leg,
-                zone,
+                zone: view.zone,
                 waypoints: finished.waypoints,
                 points: finished.points,
                 candidates,
@@ -139,9 +142,8 @@ pub fn replan(
 
     let spliced = splice(input.mission, &flown.legs, &detours)?;
     let after = judge(&input.with_mission(&spliced.mission), options)?;
-    if let Some(bad) = after.legs.iter().find(|leg| leg.blocker.is_some()) {
-        let region = bad.blocker.as_ref().map_or_else(String::new, |(region, _)| region.clone());
-        return Err(ReplanError::NotVerified { leg: bad.leg.name().to_string(), region });
+    if let Some(bad) = after.legs.iter().find(|leg| !leg.is_clear()) {
+        return Err(not_verified(bad));
     }
     Ok(Replanned {
         mission: spliced.mission,
@@ -154,11 +156,31 @@ pub fn replan(
     })
 }
 
+/// Why the new mission does not pass.
+fn not_verified(bad: &LegVerdict) -> ReplanError {
+    let leg = bad.leg.name().to_string();
+    let region = bad.blocker.as_ref().map_or_else(String::new, |(region, _)| region.clone());
+    match (&bad.limit, bad.leg.shape) {
+        (Some(finding), _) => ReplanError::Altitude { leg, why: finding.to_string() },
+        // Its curve depends on the legs before and after it.
+        (None, LegShape::Curved { .. }) => {
+            let why = "waypoints in the leg before or after it bend it that way; make it straight \
+                       (NAV_WAYPOINT), or move it";
+            ReplanError::Fixed { leg, region, why: why.to_owned() }
+        }
+        _ => ReplanError::NotVerified { leg, region },
+    }
+}
+
 /// The legs that are not clear, in order; one of those that share their waypoints.
 fn legs_to_replan(before: &Verdict) -> Result<Vec<usize>, ReplanError> {
     let mut taken = BTreeSet::new();
     let mut blocked = Vec::new();
     for (index, verdict) in before.legs.iter().enumerate() {
+        if let Some(finding) = &verdict.limit {
+            let leg = verdict.leg.name().to_string();
+            return Err(ReplanError::Altitude { leg, why: finding.to_string() });
+        }
         let Some((region, _)) = &verdict.blocker else { continue };
         if !can_be_replanned(&verdict.leg) {
             let why = "no waypoint can be put into it; move its ends or the fence".to_owned();

@@ -1,7 +1,7 @@
 //! Why there is no plan, in words that name the leg, the regions, and what to do next.
 
 use super::field::FieldError;
-use crate::fence::FenceSet;
+use crate::airspace::RegionId;
 use crate::geodesy::ProjectionError;
 use crate::mission::{Leg, LegError, SpliceError};
 use crate::planner::PlanError;
@@ -50,6 +50,22 @@ pub enum ReplanError {
         /// Why it cannot be re-planned, and what to do.
         why: String,
     },
+    /// A leg breaks an altitude limit, or cannot be judged by one. Waypoints are no help.
+    #[error("the {leg} {why}")]
+    Altitude {
+        /// The leg's name.
+        leg: String,
+        /// Which limit, and what to do.
+        why: String,
+    },
+    /// A limit of the vehicle cannot be judged for this mission.
+    #[error("{limit} cannot be judged: {why}")]
+    Limit {
+        /// The limit.
+        limit: String,
+        /// Why, and what to do.
+        why: String,
+    },
     /// The waypoints cannot be put into the mission.
     #[error(transparent)]
     Splice(#[from] SpliceError),
@@ -93,6 +109,8 @@ impl ReplanError {
                 | Self::Infeasible { .. }
                 | Self::NotFound { .. }
                 | Self::Fixed { .. }
+                | Self::Altitude { .. }
+                | Self::Limit { .. }
                 | Self::Splice(_)
                 | Self::NotVerified { .. }
         )
@@ -103,10 +121,12 @@ impl ReplanError {
     }
 
     /// A planner's error about a leg, with regions by their names.
-    pub(super) fn from_plan(error: PlanError, leg: &Leg, fences: &FenceSet) -> Self {
-        let name = |region: &crate::airspace::RegionId| {
-            fences.regions.get(region.0 as usize).map_or("a fence", |r| r.origin.as_str())
-        };
+    pub(super) fn from_plan(
+        error: PlanError,
+        leg: &Leg,
+        region_name: &dyn Fn(RegionId) -> String,
+    ) -> Self {
+        let name = |region: &RegionId| region_name(*region);
         let leg = leg.name().to_string();
         let end = |goal: bool| if goal { "its end" } else { "its start" };
         match error {
@@ -120,7 +140,7 @@ impl ReplanError {
                 Self::Infeasible { leg, why: format!("{where_}; move it, or lower --buffer") }
             }
             PlanError::Infeasible { goal, regions } => {
-                let names: Vec<&str> = regions.iter().map(name).collect();
+                let names: Vec<String> = regions.iter().map(name).collect();
                 let why = format!(
                     "{} is shut in by {}; open the fence, or lower --buffer",
                     end(goal),
