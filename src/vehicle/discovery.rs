@@ -74,6 +74,7 @@ impl fmt::Display for Autopilot {
 pub struct Capabilities(pub u64);
 
 impl Capabilities {
+    const PARAM_ENCODE_BYTEWISE: u64 = 16;
     const FTP: u64 = 32;
     const FENCE: u64 = 16_384;
     const RALLY: u64 = 32_768;
@@ -82,6 +83,12 @@ impl Capabilities {
     #[must_use]
     pub fn has_ftp(self) -> bool {
         self.0 & Self::FTP != 0
+    }
+
+    /// Whether integer parameters travel with their own bytes, not converted to a float.
+    #[must_use]
+    pub fn copies_parameter_bytes(self) -> bool {
+        self.0 & Self::PARAM_ENCODE_BYTEWISE != 0
     }
 
     /// Whether it holds its fence as mission items.

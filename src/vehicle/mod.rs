@@ -1,8 +1,8 @@
 //! The vehicle at the other end of a link: finding it, knowing its state, and moving missions,
 //! fences and rally points without ever losing one.
 //!
-//! [`discovery`] finds it, [`state`] follows it, [`download`], [`upload`] and [`clear`] speak the mission
-//! protocol over [`transfer`], [`readback`] compares what was sent with what is held,
+//! [`discovery`] finds it, [`state`] follows it, [`parameter`] reads its parameters, [`download`],
+//! [`upload`] and [`clear`] speak the mission protocol over [`transfer`], [`readback`] compares what was sent with what is held,
 //! [`replace`] is the safe sequence of it all, [`numbering`] turns the vehicle's lists into
 //! missions and back.
 
@@ -10,6 +10,7 @@ pub mod clear;
 pub mod discovery;
 pub mod download;
 pub mod numbering;
+pub mod parameter;
 pub mod readback;
 pub mod replace;
 pub mod state;
@@ -25,6 +26,7 @@ use tokio::task::JoinHandle;
 use tokio::time::timeout;
 
 pub use discovery::{Autopilot, Capabilities, DiscoveryError, Search, find};
+pub use parameter::{ParameterError, ParameterValue};
 pub use state::{Position, VehicleState};
 pub use timing::Timing;
 pub use transfer::{MissionResult, Progress, TransferError};

@@ -17,6 +17,8 @@ pub struct Timing {
     pub item_max: Duration,
     /// How many measured round trips to wait for an item.
     pub round_trips: u32,
+    /// For the answers to a round of questions for parameters.
+    pub parameter: Duration,
     /// How often a message is repeated before it can count as unanswered.
     pub retries: u32,
     /// A transfer that has not come forward for this long is given up, after the retries. Longer
@@ -48,6 +50,7 @@ impl Default for Timing {
             item_min: Duration::from_millis(250),
             item_max: Duration::from_millis(1500),
             round_trips: 4,
+            parameter: Duration::from_millis(400),
             retries: 5,
             patience: Duration::from_secs(10),
             restarts: 3,

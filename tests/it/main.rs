@@ -7,6 +7,7 @@ mod bad_links;
 mod campaign;
 mod commands;
 mod compare;
+mod parameters;
 mod replacing;
 mod scenes;
 mod sitl;

@@ -3,6 +3,7 @@
 
 mod discovery;
 mod download;
+mod parameter;
 mod upload;
 
 use std::sync::Arc;
