@@ -13,8 +13,8 @@ use super::files::{self, out_format};
 use super::options::PlanningArgs;
 use super::plan::{Delivered, Outcome, planned_scenario};
 use super::progress::Shown;
-use crate::fence::FenceSet;
 use crate::fence::items::decode_fence;
+use crate::fence::{FenceSet, VehicleRules};
 use crate::formats::Scenario;
 use crate::geodesy::LatLon;
 use crate::link::{ComponentId, Endpoint, Identity, Link, SystemId, Transport};
@@ -131,9 +131,12 @@ async fn with_vehicle(
     }
 
     let began = Instant::now();
-    let read = read(vehicle, store, args, shown).await?;
+    shown.doing("reading the vehicle's parameters");
+    let (rules, loiter) = vehicle.rules().await?;
+    let read = read(vehicle, store, args, &rules, shown).await?;
     shown.warn(&read.scenario.warnings);
-    let options = args.planning.options();
+    let inclusion = args.planning.safety.inclusion.0;
+    let options = args.planning.options().with_rules(rules, inclusion, loiter);
     if read.scenario.mission.items.is_empty() {
         return Err(CliError::Usage(
             "the vehicle holds no mission; upload one with a ground station first".to_owned(),
@@ -206,6 +209,7 @@ async fn read(
     vehicle: &Vehicle,
     store: &Store,
     args: &OnceArgs,
+    rules: &VehicleRules,
     shown: &Shown,
 ) -> Result<Read, CliError> {
     let mut on_progress = |progress| shown.transfer(progress);
@@ -222,6 +226,10 @@ async fn read(
     let mission = to_mission(vehicle.autopilot(), &original, state.home);
     let decoded = decode_fence(&fence, None)?;
     let (mut fences, mut warnings) = (decoded.fences, decoded.warnings);
+    if args.planning.safety.ignore_disabled_fence {
+        warnings.extend(rules.leave_out_disabled(&mut fences));
+    }
+    warnings.extend(rules.odd_inclusions(&fences, mission.home.map(|home| home.position)));
     files::add_fences(&mut fences, &mut warnings, &args.planning.safety)?;
     let places = rally_places(&rally)?;
     // The vehicle stands at home before it takes off; in flight its own place counts.

@@ -25,6 +25,10 @@ pub struct SafetyArgs {
     /// it (ArduPilot's FENCE_OPTIONS), all of them for files.
     #[arg(long, default_value = "auto", value_parser = inclusion, value_name = "auto|all|any")]
     pub inclusion: InclusionChoice,
+    /// Leave out areas of the vehicle's own fence that it has switched off (FENCE_ENABLE,
+    /// FENCE_TYPE, GF_ACTION); otherwise they count like all others.
+    #[arg(long)]
+    pub ignore_disabled_fence: bool,
     /// Vertical distance to keep from an obstacle with a height, to be flown over or under it,
     /// metres.
     #[arg(long, default_value_t = 10.0, value_parser = vertical, value_name = "M")]

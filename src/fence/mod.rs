@@ -15,7 +15,7 @@ pub use height::{HeightRange, HeightReference};
 pub use items::{DecodedFence, FenceItemError, decode_fence, encode_fence};
 pub use rules::{InclusionRule, Limit, Limits, VehicleRules};
 
-use crate::geodesy::LatLon;
+use crate::geodesy::{LatLon, geodesic_distance};
 use crate::units::Metres;
 
 /// On which side of its edge a region may be flown in.
@@ -39,6 +39,28 @@ pub enum FenceShape {
         /// Its radius.
         radius: Metres,
     },
+}
+
+impl FenceShape {
+    /// Whether a position is inside, as the autopilots tell: by the even-odd rule in degrees, and by
+    /// the distance on the ground. For what is said about a region, not for judging a path.
+    #[must_use]
+    pub fn contains(&self, position: LatLon) -> bool {
+        match self {
+            Self::Circle { centre, radius } => geodesic_distance(*centre, position) < *radius,
+            Self::Polygon(ring) => {
+                let edges = ring.iter().zip(ring.iter().cycle().skip(1));
+                edges.fold(false, |inside, (a, b)| {
+                    let crosses = (a.lat() > position.lat()) != (b.lat() > position.lat())
+                        && position.lon()
+                            < (b.lon() - a.lon()) * (position.lat() - a.lat())
+                                / (b.lat() - a.lat())
+                                + a.lon();
+                    inside != crosses
+                })
+            }
+        }
+    }
 }
 
 /// One region, and where it came from so that a message can name it.

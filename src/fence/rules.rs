@@ -34,7 +34,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::{FenceRegion, FenceRole, FenceShape};
+use super::{FenceRegion, FenceRole, FenceSet, FenceShape};
 use crate::geodesy::LatLon;
 use crate::mission::Autopilot;
 use crate::units::Metres;
@@ -132,6 +132,8 @@ impl Limits {
 /// What a vehicle's parameters say.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct VehicleRules {
+    /// Whether they are those of PX4.
+    px4: bool,
     /// Whether the drawn areas are enforced.
     pub drawn: Enforcement,
     /// What several inclusions mean together, where that is known.
@@ -178,6 +180,38 @@ impl VehicleRules {
             Autopilot::Px4 => &PX4,
             Autopilot::Unknown => &[],
         }
+    }
+
+    /// Takes the areas of the vehicle's own fence out where it has switched them off, and says so.
+    #[must_use]
+    pub fn leave_out_disabled(&self, fences: &mut FenceSet) -> Option<String> {
+        let areas = fences.regions.len();
+        match self.drawn {
+            Enforcement::Off if areas > 0 => {
+                fences.regions.clear();
+                Some(format!(
+                    "the {areas} areas of the vehicle's fence are left out: it has switched them off"
+                ))
+            }
+            _ => None,
+        }
+    }
+
+    /// Inclusions that PX4 leaves out because home is not in them. Here they count, so that there
+    /// is no way out of home: said so that the refusal is understood.
+    #[must_use]
+    pub fn odd_inclusions(&self, fences: &FenceSet, home: Option<LatLon>) -> Vec<String> {
+        let Some(home) = home.filter(|_| self.px4) else { return Vec::new() };
+        let inclusions = fences.regions.iter().filter(|region| region.role == FenceRole::Inclusion);
+        inclusions
+            .filter(|region| !region.shape.contains(home))
+            .map(|region| {
+                format!(
+                    "{}: home is not inside; PX4 would leave this inclusion out, here it counts",
+                    region.origin
+                )
+            })
+            .collect()
     }
 
     /// The rules from the vehicle's parameters; `value` knows those of
@@ -316,6 +350,7 @@ impl Reading<'_> {
     }
 
     fn px4(&mut self) {
+        self.rules.px4 = true;
         self.rules.inclusion = Some(InclusionRule::All);
         let action = self.expect("GF_ACTION", "the drawn fence counts");
         self.rules.drawn = match action {
@@ -431,6 +466,33 @@ mod tests {
         assert_eq!(rules.drawn, Enforcement::Off);
         assert_eq!(rules.loiter_radius, Some(Metres(80.0)));
         assert!(rules.missing.is_empty(), "{:?}", rules.missing);
+    }
+
+    fn triangle(north: f64) -> FenceRegion {
+        let corner = |lat: f64, lon: f64| LatLon::new(lat + north, lon).unwrap();
+        let shape = FenceShape::Polygon(vec![corner(0., 0.), corner(1., 0.), corner(0., 1.)]);
+        let origin = "fence items 0-2".to_owned();
+        FenceRegion { role: FenceRole::Inclusion, shape, heights: None, origin }
+    }
+
+    #[test]
+    fn a_disabled_fence_is_left_out_only_where_it_is_known_to_be() {
+        let left = |rules: &VehicleRules| {
+            let mut fences = FenceSet { regions: vec![triangle(0.0)], return_point: None };
+            (rules.leave_out_disabled(&mut fences).is_some(), fences.regions.len())
+        };
+        assert_eq!(left(&ardupilot(&[])), (false, 1));
+        assert_eq!(left(&ardupilot(&[("FENCE_ENABLE", 0.0)])), (true, 0));
+        assert_eq!(left(&ardupilot(&[("FENCE_ENABLE", -99.0)])), (false, 1), "not known");
+    }
+
+    #[test]
+    fn an_inclusion_that_px4_would_leave_out_is_named() {
+        let fences = FenceSet { regions: vec![triangle(0.0), triangle(5.0)], return_point: None };
+        let home = LatLon::new(0.2, 0.2).unwrap();
+        let px4 = VehicleRules::read(Autopilot::Px4, |_| None);
+        assert_eq!(px4.odd_inclusions(&fences, Some(home)).len(), 1);
+        assert!(ardupilot(&[]).odd_inclusions(&fences, Some(home)).is_empty());
     }
 
     #[test]
