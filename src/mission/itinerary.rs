@@ -10,7 +10,7 @@ use super::Mission;
 use super::altitude::Altitude;
 use super::autopilot::Autopilot;
 use super::commands::{Destination, LoiterHabit, Role};
-use super::curve::{arc_bound, spline_bound};
+use super::curve::{arc_bound, bend_splines, spline_bound};
 use super::insertion::insertion_point;
 use super::item::{Command, MissionItem};
 use super::jumps::Jumps;
@@ -76,6 +76,7 @@ pub(super) fn follow(
     itinerary.legs.clear();
     itinerary.walk_all(start)?;
     itinerary.stay_at_places_without_legs();
+    bend_splines(items, &mut itinerary.legs);
     warnings.extend(items.iter().enumerate().filter_map(warning));
     warnings.sort_by_key(|warning| warning.item());
     Ok(MissionLegs { legs: itinerary.legs, warnings })
@@ -384,10 +385,14 @@ impl Itinerary<'_> {
     fn shape(&self, destination: Destination, from: &LegEnd, to: &LegEnd) -> LegShape {
         let item = to.item.map(|item| &self.items[item]);
         match (destination, item) {
-            (Destination::Spline, _) => LegShape::Curved { within: spline_bound(from, to) },
-            (Destination::Arc, Some(item)) => {
-                LegShape::Curved { within: arc_bound(f64::from(item.params[0]), from, to) }
+            (Destination::Spline, _) => {
+                let any = spline_bound(from, to);
+                LegShape::Curved { within: any, overshoot: any }
             }
+            (Destination::Arc, Some(item)) => LegShape::Curved {
+                within: arc_bound(f64::from(item.params[0]), from, to),
+                overshoot: Some(Metres::ZERO),
+            },
             _ => LegShape::Straight,
         }
     }

@@ -84,9 +84,11 @@ pub enum LegShape {
     Straight,
     /// On a curve (spline or arc).
     Curved {
-        /// No point of the curve is further than this from the straight line; `None` where that
-        /// cannot be told.
+        /// No point of the curve is further than this from the straight line, seen from above;
+        /// `None` where that cannot be told.
         within: Option<Metres>,
+        /// No point is further than this above or below both ends; `None` likewise.
+        overshoot: Option<Metres>,
     },
 }
 
@@ -133,7 +135,7 @@ impl Leg {
         let circles = self.from.circle.max(self.to.circle);
         match self.shape {
             LegShape::Straight => Some(circles),
-            LegShape::Curved { within } => within.map(|within| within + circles),
+            LegShape::Curved { within, .. } => within.map(|within| within + circles),
         }
     }
 }

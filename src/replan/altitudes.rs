@@ -278,7 +278,7 @@ impl Altitudes {
         }
         let overshoot = match leg.shape {
             LegShape::Straight => 0.0,
-            LegShape::Curved { within } => within.ok_or(Incomparable::Leg)?.0,
+            LegShape::Curved { overshoot, .. } => overshoot.ok_or(Incomparable::Leg)?.0,
         };
         let low = altitudes.iter().copied().fold(f64::INFINITY, f64::min) - overshoot;
         let high = altitudes.iter().copied().fold(f64::NEG_INFINITY, f64::max) + overshoot;
@@ -309,8 +309,15 @@ impl Altitudes {
         let Some(ends) = self.above_home(leg) else {
             return Some(LimitFinding::NotComparable { limit });
         };
-        let high = ends.iter().map(|(_, high)| *high).reduce(f64::max)?;
-        let low = ends.iter().map(|(low, _)| *low).reduce(f64::min)?;
+        let overshoot = match leg.shape {
+            LegShape::Straight => 0.0,
+            LegShape::Curved { overshoot: Some(overshoot), .. } => overshoot.0,
+            LegShape::Curved { overshoot: None, .. } => {
+                return Some(LimitFinding::NotComparable { limit });
+            }
+        };
+        let high = ends.iter().map(|(_, high)| *high).reduce(f64::max)? + overshoot;
+        let low = ends.iter().map(|(low, _)| *low).reduce(f64::min)? - overshoot;
         // At the limit is a breach: AC_Fence compares with >= and <=, PX4 with <.
         if let Some(limit) = self.limits.ceiling.filter(|limit| high >= limit.metres.0) {
             return Some(LimitFinding::Above { flown: Metres(high), limit });
