@@ -9,6 +9,7 @@ use quav::qaoa::engine::Engine;
 use quav::qaoa::statevector::{Precision, StatevectorEngine};
 use quav::qaoa::train::train;
 use quav::qaoa::{Angles, ChainIsing, Ising, Scale, TrainSettings};
+use quav::stop::Stop;
 use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -70,14 +71,15 @@ fn chain_expectation(bencher: Bencher<'_, '_>, qubits: usize) {
 fn chain_training_60_steps(bencher: Bencher<'_, '_>, qubits: usize) {
     let mut engine = chain(qubits);
     let settings = TrainSettings::default();
-    bencher.bench_local(|| train(&mut engine, Angles::ramp(LAYERS), &settings).unwrap());
+    bencher
+        .bench_local(|| train(&mut engine, Angles::ramp(LAYERS), &settings, &Stop::new()).unwrap());
 }
 
 #[divan::bench(args = CHAINS, sample_count = 10)]
 fn chain_1024_shots(bencher: Bencher<'_, '_>, qubits: usize) {
     let mut engine = chain(qubits);
     let settings = TrainSettings::default();
-    let angles = train(&mut engine, Angles::ramp(LAYERS), &settings).unwrap().angles;
+    let angles = train(&mut engine, Angles::ramp(LAYERS), &settings, &Stop::new()).unwrap().angles;
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     bencher.bench_local(|| engine.sample(&angles, 1024, &mut rng).unwrap());
 }

@@ -12,6 +12,7 @@
 //! - [`planner`]: one leg: candidates, QAOA rounds, finish;
 //! - [`qaoa`]: Ising problems and the engines that run the circuit;
 //! - [`baseline`]: A* and RRT, to compare with;
+//! - [`stop`]: calling all of that off, and its deadline;
 //! - [`replan`]: a whole mission, and the judgement of any mission;
 //! - [`report`]: what is said and shown about it: JSON, a summary, a picture;
 //! - [`cli`]: the commands of `quavd`.
@@ -28,6 +29,7 @@ pub mod planner;
 pub mod qaoa;
 pub mod replan;
 pub mod report;
+pub mod stop;
 pub mod store;
 pub mod units;
 pub mod vehicle;

@@ -31,6 +31,7 @@ COMMAND_HELP = """control commands (--control, --script), one JSON object per li
                                          another ground station (255/190) uploads X over the protocol, one item
                                          per pace seconds, giving up silently after `stop` items if given; X as
                                          it goes over the link (for an ArduPilot item 0 is the home slot)
+  {"cmd": "inject", "hex": "fd09..."}    puts these bytes on every link, as somebody else on the line would
   {"cmd": "statustext", "text": "hello", "severity": 6}
   {"cmd": "quit"}
 
@@ -53,6 +54,7 @@ class Controller:
         handler = {
             "dump": self._dump, "set": self._set, "fault": self._fault, "clear-faults": self._clear_faults,
             "reboot": self._reboot, "vanish": self._vanish, "statustext": self._statustext,
+            "inject": self._inject,
             "gcs-upload": self._gcs_upload, "quit": self._quit,
         }.get(command.get("cmd"))
         if handler is None:
@@ -108,6 +110,11 @@ class Controller:
 
     def _statustext(self, command):
         self.vehicle.statustext(int(command.get("severity", 6)), str(command["text"]))
+
+    def _inject(self, command):
+        data = bytes.fromhex(command["hex"])
+        for channel in self.vehicle.channels:
+            channel.write(data)
 
     def _quit(self, _command):
         self.quit_event.set()

@@ -84,6 +84,7 @@ KINDS = {
     "duplicate": (FRAMES, {"copies": (_whole, 1)}, "deliver copies times more"),
     "reorder": (FRAMES, {"ms": (_seconds, 30.0)}, "hold the frame back for ms and let later ones overtake it"),
     "corrupt": (FRAMES, {}, "flip bits on the way (towards the vehicle: the frame is lost to its checksum)"),
+    "noise": (FRAMES, {"bytes": (_whole, 1000)}, "random bytes before the frame (over UDP: in a datagram of their own)"),
     "silence": (FRAMES, {"for": (_seconds, 2.0), "every": (_seconds, None)},
                 "a burst of total loss: for seconds from `from` on, again every `every` seconds"),
     "refuse-count": (PLANS, {"code": (_whole, 4)}, "answer an upload's COUNT with this MAV_MISSION_RESULT"),
@@ -183,6 +184,7 @@ class Verdict:
     copies: int = 1
     delay_s: float = 0.0
     hold_s: float = 0.0
+    noise_bytes: int = 0
     because: list = field(default_factory=list)
 
 
@@ -251,6 +253,8 @@ class Faults:
             verdict.delay_s += (options["ms"] + self.random.random() * options["jitter"]) / 1000
         elif fault.kind == "reorder":
             verdict.hold_s = max(verdict.hold_s, options["ms"] / 1000)
+        elif fault.kind == "noise":
+            verdict.noise_bytes += options["bytes"]
         verdict.because.append(fault.kind)
 
     def corrupted(self, frame):

@@ -67,6 +67,8 @@ class Channel:
         """Sends a finished frame (also used to forward those of others)."""
         faults = self.vehicle.faults
         verdict = faults.frame("tx", name, self.link.number)
+        if verdict.noise_bytes:
+            self.write(faults.random.randbytes(verdict.noise_bytes))
         if verdict.lost:
             self.counts["tx_lost"] += 1
             return

@@ -55,13 +55,7 @@ pub fn run(args: &CheckArgs, shown: &Shown) -> Result<String, CliError> {
     let options = args.safety.options();
     let verdict = judge(&input, &options)?;
     shown.warn(&scenario.warnings);
-    let run = Run {
-        options: &options,
-        warnings: &scenario.warnings,
-        fallback: None,
-        load,
-        total: began.elapsed(),
-    };
+    let run = Run { options: &options, warnings: &scenario.warnings, load, total: began.elapsed() };
     let text = if args.json {
         to_json(&CheckDocument::new(&verdict, &run))?
     } else {

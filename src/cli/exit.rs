@@ -82,7 +82,14 @@ macro_rules! usage_errors {
     )*};
 }
 
-usage_errors!(FileError, FormatError, FenceItemError, QaoaCommandError, StoreError);
+usage_errors!(
+    FileError,
+    FormatError,
+    FenceItemError,
+    QaoaCommandError,
+    StoreError,
+    crate::link::SigningError
+);
 
 impl From<ReplanError> for CliError {
     fn from(error: ReplanError) -> Self {

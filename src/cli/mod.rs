@@ -2,6 +2,7 @@
 //! and nowhere else.
 //!
 //! - [`options`]: what the commands have in common, with the names of the configuration file;
+//! - [`signing`]: the options that sign a link;
 //! - [`files`]: scenarios, missions and fences from files, results to files;
 //! - [`progress`]: what is shown while something runs;
 //! - [`plan`], [`check`], [`once`], [`compare`], [`qaoa`]: one command each;
@@ -18,6 +19,7 @@ pub mod options;
 pub mod plan;
 pub mod progress;
 pub mod qaoa;
+pub mod signing;
 
 use std::process::ExitCode;
 

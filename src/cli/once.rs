@@ -1,8 +1,6 @@
 //! `quavd once`: read from the vehicle, plan, upload, verify, exit.
 
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::Args;
@@ -13,14 +11,16 @@ use super::files::{self, out_format};
 use super::options::PlanningArgs;
 use super::plan::{Delivered, Outcome, planned_scenario};
 use super::progress::Shown;
+use super::signing::SigningArgs;
 use crate::fence::items::decode_fence;
 use crate::fence::{FenceSet, VehicleRules};
 use crate::formats::Scenario;
 use crate::geodesy::LatLon;
-use crate::link::{ComponentId, Endpoint, Identity, Link, SystemId, Transport};
+use crate::link::{ComponentId, Endpoint, Identity, Link, Signer, SystemId, Transport};
 use crate::mission::{self, Mission, MissionItem, MissionType};
 use crate::replan::{self, Input, Options, Replanned, replan};
 use crate::report::picture::picture;
+use crate::stop::Stop;
 use crate::store::Store;
 use crate::vehicle::numbering::{to_mission, to_vehicle};
 use crate::vehicle::readback::differences;
@@ -62,6 +62,9 @@ pub struct OnceArgs {
     /// .svg). May be repeated.
     #[arg(long, value_name = "FILE")]
     pub out: Vec<PathBuf>,
+    /// Who is believed.
+    #[command(flatten)]
+    pub signing: SigningArgs,
     /// How to plan.
     #[command(flatten)]
     pub planning: PlanningArgs,
@@ -83,7 +86,11 @@ pub fn run(args: OnceArgs, shown: &Shown) -> Result<String, CliError> {
     runtime.block_on(async {
         let cancel = CancellationToken::new();
         shown.doing(format!("connecting to {}", args.connect));
-        let transport = Transport::open(&args.connect).await?;
+        let mut transport = Transport::open(&args.connect).await?;
+        if let Some(settings) = args.signing.settings() {
+            let state = state_directory(args.state_dir.as_ref())?;
+            transport = transport.signed(Signer::open(&settings, &state)?);
+        }
         let identity = Identity {
             system: SystemId(args.system.unwrap_or(1)),
             component: ComponentId(args.component),
@@ -260,25 +267,24 @@ async fn plan_off_thread(
     options: &Options,
     shown: &Shown,
 ) -> Result<Replanned, CliError> {
-    let cancelled = Arc::new(AtomicBool::new(false));
+    let stop = Stop::new();
     let task = {
         let (mission, fences): (Mission, FenceSet) =
             (read.scenario.mission.clone(), read.scenario.fences.clone());
         let (rally, start, autopilot) = (read.rally.clone(), read.start, read.autopilot);
-        let (options, shown, cancelled) = (options.clone(), shown.clone(), Arc::clone(&cancelled));
+        let (options, shown, stop) = (options.clone(), shown.clone(), stop.clone());
         tokio::task::spawn_blocking(move || {
             let input =
                 Input { mission: &mission, fences: &fences, rally: &rally, start, autopilot };
-            let mut leg = String::new();
-            let watch = |progress: replan::Progress<'_>| shown.planning(&progress, &mut leg);
-            replan(&input, &options, &cancelled, watch)
+            let watch = |progress: replan::Progress<'_>| shown.planning(&progress);
+            replan(&input, &options, &stop, watch)
         })
     };
     tokio::pin!(task);
     let finished = tokio::select! {
         finished = &mut task => finished,
         _ = tokio::signal::ctrl_c() => {
-            cancelled.store(true, Ordering::Relaxed);
+            stop.cancel();
             task.await
         }
     };

@@ -1,6 +1,7 @@
 //! The options that planning commands have in common.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::Args;
 
@@ -93,6 +94,10 @@ fn lambda(text: &str) -> Result<f64, String> {
     number(text, 0.0, 1000.0)
 }
 
+fn deadline(text: &str) -> Result<f64, String> {
+    number(text, 0.001, 1e6)
+}
+
 fn learning_rate(text: &str) -> Result<f64, String> {
     number(text, 1e-6, 10.0)
 }
@@ -137,6 +142,10 @@ pub struct PlanningArgs {
     /// QAOA engine: auto, chain or statevector.
     #[arg(long, default_value = "auto", value_name = "ENGINE")]
     pub engine: EngineChoice,
+    /// How long planning may take, seconds; then the best clear path until then is used, and the
+    /// result says so.
+    #[arg(long, value_parser = deadline, value_name = "SECONDS")]
+    pub deadline: Option<f64>,
     /// Exactly the settings of the paper's table: 20 qubits, 5 layers, 60 Adam steps at 0.1 in
     /// every round, 5 m buffer, grid candidates.
     #[arg(long, conflicts_with_all = ["buffer", "qubits", "layers", "steps", "learning_rate", "candidates", "grid"])]
@@ -185,6 +194,7 @@ impl PlanningArgs {
             memory_limit: memory::available(),
             ..base
         };
-        Options { settings, ..self.safety.options() }
+        let deadline = self.deadline.map(Duration::from_secs_f64);
+        Options { settings, deadline, ..self.safety.options() }
     }
 }

@@ -1,7 +1,6 @@
 //! `quavd plan`: the planning of `once` from files, without a vehicle.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use clap::Args;
@@ -18,6 +17,7 @@ use crate::report::Run;
 use crate::report::json::PlanDocument;
 use crate::report::picture::{Subject, picture};
 use crate::report::summary::plan_summary;
+use crate::stop::Stop;
 
 /// The arguments of `quavd plan`.
 #[derive(Debug, Args)]
@@ -60,9 +60,8 @@ pub fn run(args: &PlanArgs, shown: &Shown) -> Result<String, CliError> {
         autopilot: scenario.vehicle.autopilot,
     };
     let load = began.elapsed();
-    let mut leg = String::new();
-    let watch = |progress: Progress<'_>| shown.planning(&progress, &mut leg);
-    let planned = replan(&input, &options, &AtomicBool::new(false), watch);
+    let watch = |progress: Progress<'_>| shown.planning(&progress);
+    let planned = replan(&input, &options, &Stop::new(), watch);
     let planned = planned.map_err(CliError::from);
     shown.clear();
     let before = match &planned {
@@ -147,13 +146,7 @@ struct Document {
 impl Outcome<'_> {
     /// The circumstances, for reports.
     pub(super) fn run(&self) -> Run<'_> {
-        Run {
-            options: self.options,
-            warnings: self.warnings,
-            fallback: None,
-            load: self.load,
-            total: self.total,
-        }
+        Run { options: self.options, warnings: self.warnings, load: self.load, total: self.total }
     }
 
     /// The text for stdout, or the error with its document.

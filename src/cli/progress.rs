@@ -76,17 +76,7 @@ impl Shown {
     }
 
     /// Planning's progress.
-    pub fn planning(&self, progress: &replan::Progress<'_>, leg: &mut String) {
-        match progress {
-            replan::Progress::Leg { number, of, name } => {
-                *leg = format!("leg {number}/{of} ({name})");
-                self.doing(format!("{leg}: looking for candidates"));
-            }
-            replan::Progress::Round { number, round } => {
-                let loss = round.loss.last().copied().unwrap_or(f64::NAN);
-                let length = round.length;
-                self.doing(format!("{leg}: round {number}, loss {loss:.1}, length {length:.1} m"));
-            }
-        }
+    pub fn planning(&self, progress: &replan::Progress<'_>) {
+        self.doing(progress.to_string());
     }
 }

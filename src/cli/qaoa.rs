@@ -17,6 +17,7 @@ use crate::qaoa::{
     Angles, AnglesSource, EngineChoice, EngineError, Ising, IsingError, Qaoa, QaoaRun, RunSettings,
     Scale, TrainSettings,
 };
+use crate::stop::Stop;
 
 /// The largest file that is read: room for a million couplings.
 const MAX_FILE_BYTES: u64 = 64 << 20;
@@ -161,7 +162,7 @@ pub fn run(args: &QaoaArgs) -> Result<String, QaoaCommandError> {
         PrecisionArg::F32 => Precision::Single,
     };
     let mut qaoa = Qaoa::new(memory::available()).with_precision(precision);
-    let run = qaoa.run(&ising, &settings)?;
+    let run = qaoa.run(&ising, &settings, &Stop::new())?;
     let time_ms = began.elapsed().as_secs_f64() * 1e3;
     Ok(if args.json { format!("{:#}\n", document(&run, time_ms)) } else { summary(&run, time_ms) })
 }

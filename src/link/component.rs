@@ -1,13 +1,14 @@
 //! quavd as a MAVLink component: one task owns the line, reads it, writes it, and beats the heart
 //! once a second. Everybody else holds a [`Link`] and sees every frame that came in.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::net::SocketAddr;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use mavlink::MessageData;
+use mavlink::{MAVLinkMessageRaw, MessageData};
 use tokio::sync::{broadcast, mpsc, watch};
 use tokio::task::JoinHandle;
 use tokio::time::{MissedTickBehavior, timeout};
@@ -16,7 +17,9 @@ use tokio_util::sync::CancellationToken;
 use super::frame::{Packet, Received};
 use super::id::{ComponentId, Node, SystemId};
 use super::message::Heartbeat;
-use super::transport::{Peer, Sink, Source, Transport};
+use super::peer::Peer;
+use super::signing::{Rejection, Signer};
+use super::transport::{Sink, Source, Transport};
 
 /// MAVLink asks for one heartbeat a second from every component, also when idle.
 const HEARTBEAT_INTERVAL: Duration = Duration::from_secs(1);
@@ -70,6 +73,8 @@ struct Shared {
     component: ComponentId,
     received: broadcast::WeakSender<Received>,
     peer: Option<Peer>,
+    signer: Option<Mutex<Signer>>,
+    refused: Mutex<Refused>,
 }
 
 /// The task behind a [`Link`]. Shut it down and await it with [`LinkTask::close`].
@@ -104,15 +109,20 @@ impl Link {
             component: identity.component,
             received: received.downgrade(),
             peer: transport.source.peer(),
+            signer: transport.signer.map(Mutex::new),
+            refused: Mutex::default(),
         });
         let link = Self { shared: Arc::clone(&shared), outgoing, ended };
+        let (source, sink) = (transport.source, transport.sink);
         let stop = cancel.clone();
         let handle = tokio::spawn(async move {
-            let Transport { source, sink } = transport;
             let error = tokio::select! {
                 error = read(source, &shared, &received) => error,
                 error = write(sink, &shared, to_send, &stop) => error,
             };
+            if let Some(mut signer) = shared.signer() {
+                signer.close();
+            }
             match &error {
                 LinkError::Closed => tracing::debug!("link closed"),
                 error => tracing::warn!(%error, "link ended"),
@@ -134,11 +144,19 @@ impl Link {
         self.shared.system.store(system.0, Ordering::Relaxed);
     }
 
-    /// On a datagram link, talk and listen to this address only from now on.
-    pub fn pin_peer(&self, address: SocketAddr) {
+    /// On a datagram link, talk and listen to this address only from now on, as that of `system`.
+    /// When the vehicle has been silent for ten seconds and its heartbeat comes from elsewhere, the
+    /// link follows it there.
+    pub fn pin_peer(&self, address: SocketAddr, system: SystemId) {
         if let Some(peer) = &self.shared.peer {
-            peer.pin(address);
+            peer.pin(address, system);
         }
+    }
+
+    /// Why frames were dropped for their signature, and how many each.
+    #[must_use]
+    pub fn refused(&self) -> BTreeMap<Rejection, u64> {
+        self.shared.refused().counts.clone()
     }
 
     /// All frames that come in from now on. A reader that falls more than a thousand frames behind
@@ -175,6 +193,12 @@ pub struct Inbox {
 }
 
 impl Inbox {
+    /// The link whose frames these are.
+    #[must_use]
+    pub fn link(&self) -> &Link {
+        &self.link
+    }
+
     /// The next frame.
     ///
     /// # Errors
@@ -193,9 +217,65 @@ impl Inbox {
 }
 
 impl Shared {
+    fn signer(&self) -> Option<MutexGuard<'_, Signer>> {
+        Some(self.signer.as_ref()?.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    fn refused(&self) -> MutexGuard<'_, Refused> {
+        self.refused.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether a frame is one to be read: signed as it should be, and from where we listen to.
+    fn lets_in(&self, raw: &MAVLinkMessageRaw, frame: &Received) -> bool {
+        match self.signer() {
+            Some(mut signer) => {
+                if let Err(rejection) = signer.admit(raw) {
+                    self.refused().count(rejection, frame.from);
+                    return false;
+                }
+            }
+            None if frame.is_signed => self.refused().tell_of_signed(frame.from),
+            None => {}
+        }
+        match (&self.peer, frame.peer) {
+            (Some(peer), Some(from)) => peer.heard(from, frame),
+            _ => true,
+        }
+    }
+
     fn node(&self) -> Node {
         let system = SystemId(self.system.load(Ordering::Relaxed));
         Node { system, component: self.component }
+    }
+}
+
+/// Frames that were dropped for their signature. Told once for each sender and reason.
+#[derive(Default)]
+struct Refused {
+    counts: BTreeMap<Rejection, u64>,
+    told: BTreeSet<(Rejection, Node)>,
+    told_of_signed: bool,
+}
+
+impl Refused {
+    /// Senders whose frames are told of; the numbers in a forged frame are endless.
+    const MOST_TOLD: usize = 16;
+
+    fn count(&mut self, rejection: Rejection, from: Node) {
+        *self.counts.entry(rejection).or_default() += 1;
+        if self.told.len() < Self::MOST_TOLD && self.told.insert((rejection, from)) {
+            tracing::warn!(node = %from, reason = %rejection, "frames are dropped");
+        }
+    }
+
+    fn tell_of_signed(&mut self, from: Node) {
+        if !std::mem::replace(&mut self.told_of_signed, true) {
+            tracing::warn!(
+                node = %from,
+                "frames are signed and quavd has no key: it cannot tell who sent them, and the \
+                 vehicle may not listen; give the key with --signing-key"
+            );
+        }
     }
 }
 
@@ -211,6 +291,9 @@ async fn read(
             Err(error) => return LinkError::Lost(Arc::new(error)),
         };
         let Some(frame) = Received::new(&raw, peer) else { continue };
+        if !shared.lets_in(&raw, &frame) {
+            continue;
+        }
         if frame.from == shared.node() {
             // An echo of our own, or a second component with our id.
             if !std::mem::replace(&mut told_of_own_id, true) {
@@ -250,7 +333,7 @@ async fn write(
             },
             () = stop.cancelled() => return LinkError::Closed,
         };
-        let frame = packet.to_frame(shared.node(), sequence);
+        let frame = packet.to_frame(shared.node(), sequence, shared.signer().as_deref_mut());
         sequence = sequence.wrapping_add(1);
         match timeout(WRITE_TIMEOUT, sink.send(frame.raw_bytes())).await {
             Ok(Ok(())) => {}

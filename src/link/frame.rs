@@ -13,6 +13,7 @@ use mavlink::{
 use tokio::time::Instant;
 
 use super::id::{ComponentId, Node, SystemId};
+use super::signing::{SIGNED, Signer};
 
 /// The largest payload of a MAVLink frame, bytes.
 const MAX_PAYLOAD: usize = 255;
@@ -24,6 +25,8 @@ pub struct Received {
     pub from: Node,
     /// `true` for a MAVLink 1 frame, which carries no mission type and no signature.
     pub is_version_1: bool,
+    /// Whether it bears a signature; the link has checked it where it has a key.
+    pub is_signed: bool,
     /// When it was read.
     pub at: Instant,
     /// From which address, on a datagram link.
@@ -46,6 +49,7 @@ impl Received {
                 component: ComponentId(raw.component_id()),
             },
             is_version_1: raw.version() == MavlinkVersion::V1,
+            is_signed: matches!(raw, MAVLinkMessageRaw::V2(raw) if raw.incompatibility_flags() & SIGNED != 0),
             at: Instant::now(),
             peer,
             message_id: raw.message_id(),
@@ -87,14 +91,25 @@ impl Packet {
         Self { message_id: D::ID, length, payload }
     }
 
-    /// The frame, ready for the line.
-    pub(crate) fn to_frame(&self, from: Node, sequence: u8) -> MAVLinkV2MessageRaw {
+    /// The frame, ready for the line; signed where there is a signer.
+    pub(crate) fn to_frame(
+        &self,
+        from: Node,
+        sequence: u8,
+        signer: Option<&mut Signer>,
+    ) -> MAVLinkV2MessageRaw {
         let header =
             MavHeader { system_id: from.system.0.into(), component_id: from.component.0, sequence };
         let mut frame = MAVLinkV2MessageRaw::new();
         // Fails for a message without checksum seed only, and `Packet::new` takes none such.
-        let encoded = frame.serialize_message_with_dialect(header, &Wire, self);
+        let encoded = match &signer {
+            None => frame.serialize_message_with_dialect(header, &Wire, self),
+            Some(_) => frame.serialize_message_with_dialect_for_signing(header, &Wire, self),
+        };
         debug_assert!(encoded.is_ok());
+        if let Some(signer) = signer {
+            signer.sign(&mut frame);
+        }
         frame
     }
 }

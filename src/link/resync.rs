@@ -89,7 +89,7 @@ mod tests {
         line.write_all(&[0xfd, 0xff, 0x00, 0xfe, 0x80]).await.unwrap();
         let begin = Instant::now();
         for sequence in 0..3 {
-            let frame = Packet::new(&message).to_frame(node, sequence);
+            let frame = Packet::new(&message).to_frame(node, sequence, None);
             line.write_all(frame.raw_bytes()).await.unwrap();
         }
         for sequence in 0..3 {
@@ -105,7 +105,7 @@ mod tests {
         let message = MissionRequestList { target: node, mission_type: 2 };
         let (mut line, source) = tokio::io::duplex(1024);
         let mut reader = AsyncMavlinkReader::new(Resync::new(source));
-        let frame = Packet::new(&message).to_frame(node, 9);
+        let frame = Packet::new(&message).to_frame(node, 9, None);
         let write = async {
             for byte in frame.raw_bytes() {
                 line.write_all(&[*byte]).await.unwrap();

@@ -3,7 +3,7 @@
 
 use std::io;
 use std::net::SocketAddr;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 
 use mavlink::error::MessageReadError;
@@ -13,7 +13,9 @@ use tokio::net::{TcpListener, TcpStream, UdpSocket, lookup_host};
 use tokio_serial::{DataBits, FlowControl, Parity, SerialPortBuilderExt, StopBits};
 
 use super::frame::Wire;
+use super::peer::Peer;
 use super::resync::Resync;
+use super::signing::Signer;
 use super::url::{Endpoint, HostPort};
 
 /// How long a TCP connection may take to come about.
@@ -25,6 +27,7 @@ const MAX_DATAGRAM: usize = 2048;
 pub struct Transport {
     pub(super) source: Source,
     pub(super) sink: Sink,
+    pub(super) signer: Option<Signer>,
 }
 
 /// Why an endpoint could not be opened.
@@ -69,7 +72,14 @@ impl Transport {
         Self {
             source: Source::Stream(AsyncMavlinkReader::new(Resync::new(Box::new(read)))),
             sink: Sink::Stream(Box::new(write)),
+            signer: None,
         }
+    }
+
+    /// The same link with MAVLink 2 signing in both directions.
+    #[must_use]
+    pub fn signed(self, signer: Signer) -> Self {
+        Self { signer: Some(signer), ..self }
     }
 }
 
@@ -90,49 +100,6 @@ pub(super) struct Datagrams {
     socket: Arc<UdpSocket>,
     peer: Peer,
     datagram: Option<(SocketAddr, AsyncMavlinkReader<io::Cursor<Vec<u8>>>)>,
-}
-
-/// Which address a datagram link talks to.
-#[derive(Clone, Default)]
-pub(super) struct Peer(Arc<Mutex<PeerState>>);
-
-#[derive(Clone, Copy, Default)]
-struct PeerState {
-    address: Option<SocketAddr>,
-    pinned: bool,
-}
-
-impl Peer {
-    fn pinned_to(address: SocketAddr) -> Self {
-        Self(Arc::new(Mutex::new(PeerState { address: Some(address), pinned: true })))
-    }
-
-    fn state(&self) -> std::sync::MutexGuard<'_, PeerState> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn address(&self) -> Option<SocketAddr> {
-        self.state().address
-    }
-
-    /// Whether to listen to an address at all.
-    fn accepts(&self, from: SocketAddr) -> bool {
-        let state = self.state();
-        !state.pinned || state.address == Some(from)
-    }
-
-    /// A valid frame came from there: answers go there, unless the peer is settled.
-    fn heard(&self, from: SocketAddr) {
-        let mut state = self.state();
-        if !state.pinned {
-            state.address = Some(from);
-        }
-    }
-
-    /// From now on talk to this address only.
-    pub(super) fn pin(&self, address: SocketAddr) {
-        *self.state() = PeerState { address: Some(address), pinned: true };
-    }
 }
 
 impl Source {
@@ -163,7 +130,6 @@ impl Datagrams {
             if let Some((from, reader)) = &mut self.datagram {
                 // All bytes are in memory: this ends at once, with a frame or at the end.
                 if let Ok(raw) = reader.read_any_raw_message_with_dialect(&Wire).await {
-                    self.peer.heard(*from);
                     return Ok((raw, Some(*from)));
                 }
                 self.datagram = None;
@@ -250,14 +216,14 @@ async fn resolve(at: &HostPort) -> io::Result<SocketAddr> {
 
 async fn open_udp_in(at: &HostPort) -> io::Result<Transport> {
     let socket = UdpSocket::bind(resolve(at).await?).await?;
-    Ok(from_socket(socket, Peer::default()))
+    Ok(from_socket(socket, Peer::open()))
 }
 
 async fn open_udp_out(at: &HostPort) -> io::Result<Transport> {
     let to = resolve(at).await?;
     let any = if to.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" };
     let socket = UdpSocket::bind(any).await?;
-    Ok(from_socket(socket, Peer::pinned_to(to)))
+    Ok(from_socket(socket, Peer::fixed(to)))
 }
 
 fn from_socket(socket: UdpSocket, peer: Peer) -> Transport {
@@ -269,6 +235,7 @@ fn from_socket(socket: UdpSocket, peer: Peer) -> Transport {
             datagram: None,
         }),
         sink: Sink::Datagrams { socket, peer },
+        signer: None,
     }
 }
 

@@ -2,8 +2,6 @@
 //! pass obstacles on different sides. Full enumeration is exponential; a bounded number of
 //! diverse candidates stands for it.
 
-use std::sync::atomic::AtomicBool;
-
 use geo::Line;
 use serde::Serialize;
 
@@ -16,6 +14,7 @@ use super::polyline::{distance, length, turning};
 use super::search::{CornerPath, CornerSearch};
 use super::settings::Settings;
 use crate::geodesy::Xy;
+use crate::stop::Stop;
 use crate::units::Metres;
 
 /// How near a barrier is to a ray that meets it, metres.
@@ -73,18 +72,19 @@ impl Candidate {
 /// With [`super::settings::CandidateSource::Corners`] the shortest path over obstacle corners,
 /// then the best ones that are shut out of a gap of a better one; with `Grid` (the paper) paths
 /// over the grid only. As in the paper, the straight line is a candidate although it may collide.
+/// When stopped it is what was found until then.
 #[must_use]
 pub fn candidates(
     space: &LegSpace<'_>,
     start: Xy,
     goal: Xy,
     settings: &Settings,
-    cancelled: &AtomicBool,
+    stop: &Stop,
 ) -> Vec<Candidate> {
     let mut found: Vec<Candidate> = Vec::new();
     let wanted = settings.candidates.max(1);
     if settings.source.uses_corners() {
-        let mut search = CornerSearch::new(*space, start, goal, COARSE, cancelled);
+        let mut search = CornerSearch::new(*space, start, goal, COARSE, stop);
         for path in different_ways(&mut search, space, wanted) {
             let points = with_corners_that_fit(&path.points, space, settings.qubits);
             found.push(Candidate::new(points, Source::Corners, space));
@@ -92,7 +92,7 @@ pub fn candidates(
     }
     if settings.source.uses_grid() || found.is_empty() {
         let more = wanted.saturating_sub(found.len()).max(1);
-        found.extend(grid_candidates(space, start, goal, settings, more, cancelled));
+        found.extend(grid_candidates(space, start, goal, settings, more, stop));
     }
     found.sort_by(|a, b| b.clear.cmp(&a.clear).then(a.length.total_cmp(&b.length)));
     found.push(Candidate::new(vec![start, goal], Source::Straight, space));
@@ -107,11 +107,11 @@ fn grid_candidates(
     goal: Xy,
     settings: &Settings,
     wanted: usize,
-    cancelled: &AtomicBool,
+    stop: &Stop,
 ) -> Vec<Candidate> {
     for halvings in 0..=GRID_HALVINGS {
         let resolution = settings.grid.0 / f64::from(1u32 << halvings);
-        let grid = GridSearch::new(space, start, goal, Metres(resolution), cancelled);
+        let grid = GridSearch::new(space, start, goal, Metres(resolution), stop);
         let mut found: Vec<Candidate> = grid
             .paths(GRID_CHOICE * wanted)
             .into_iter()
@@ -123,7 +123,10 @@ fn grid_candidates(
             .collect();
         found.sort_by(|a, b| b.clear.cmp(&a.clear).then(a.length.total_cmp(&b.length)));
         found.truncate(wanted);
-        if found.iter().any(|candidate| candidate.clear) || grid.resolution().0 > resolution {
+        if found.iter().any(|candidate| candidate.clear)
+            || grid.resolution().0 > resolution
+            || stop.is_stopped()
+        {
             return found;
         }
     }

@@ -6,12 +6,12 @@
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::homotopy::passes_differently;
 use super::leg_space::LegSpace;
 use super::polyline::{distance, simplified};
 use crate::geodesy::Xy;
+use crate::stop::Stop;
 use crate::units::Metres;
 
 /// The most points a grid may have; where `r` would give more, `r` is doubled.
@@ -35,7 +35,7 @@ pub struct GridSearch<'a> {
     rows: usize,
     start: Xy,
     goal: Xy,
-    cancelled: &'a AtomicBool,
+    stop: &'a Stop,
 }
 
 impl<'a> GridSearch<'a> {
@@ -47,7 +47,7 @@ impl<'a> GridSearch<'a> {
         start: Xy,
         goal: Xy,
         resolution: Metres,
-        cancelled: &'a AtomicBool,
+        stop: &'a Stop,
     ) -> Self {
         let leg = distance(start, goal);
         let along = if leg > 0.0 { (goal - start) / leg } else { Xy { x: 1.0, y: 0.0 } };
@@ -64,7 +64,7 @@ impl<'a> GridSearch<'a> {
         let aside = (rows / 2) as f64 * resolution;
         let across = Xy { x: -along.y, y: along.x };
         let origin = start - along * before - across * aside;
-        Self { space: *space, origin, along, resolution, columns, rows, start, goal, cancelled }
+        Self { space: *space, origin, along, resolution, columns, rows, start, goal, stop }
     }
 
     /// The resolution: the one asked for, or a coarser one where that would be too many points.
@@ -81,7 +81,7 @@ impl<'a> GridSearch<'a> {
         let mut found: Vec<Vec<Xy>> = Vec::new();
         // A dearer neighbourhood may lead back to the same path: try a few times more.
         for _ in 0..3 * wanted {
-            if found.len() >= wanted || self.cancelled.load(Ordering::Relaxed) {
+            if found.len() >= wanted || self.stop.is_stopped() {
                 break;
             }
             let Some(cells) = self.cheapest(&mut free, &price) else { break };
@@ -148,7 +148,7 @@ impl<'a> GridSearch<'a> {
                 continue;
             }
             popped = popped.wrapping_add(1);
-            if popped.is_multiple_of(4096) && self.cancelled.load(Ordering::Relaxed) {
+            if popped.is_multiple_of(4096) && self.stop.is_stopped() {
                 return None;
             }
             if cell == goal {

@@ -1,6 +1,5 @@
 //! One leg from end to end: candidates, rounds, finish, and the reasons where there is no plan.
 
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use super::candidates::{Candidate, candidates};
@@ -8,12 +7,13 @@ use super::enclosure::enclosure;
 use super::finish::{FinishError, Finished, WORTH_OF_FEW, finished, with_few_corners};
 use super::leg_space::LegSpace;
 use super::polyline::distance;
-use super::rounds::{Contest, Round, RoundError};
+use super::rounds::{Contest, Contested, Round, RoundError};
 use super::settings::Settings;
 use super::trellis::EdgeJudge;
 use crate::airspace::RegionId;
 use crate::geodesy::{LatLon, LocalFrame, ProjectionError, Xy};
 use crate::qaoa::Qaoa;
+use crate::stop::{Stop, Stopped};
 
 /// A leg to plan.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,6 +37,8 @@ pub struct LegPlan {
     pub candidates: Vec<Candidate>,
     /// The QAOA rounds.
     pub rounds: Vec<Round>,
+    /// Whether the deadline passed before these had brought all that they could.
+    pub cut_short: bool,
     /// How long it took.
     pub times: LegTimes,
 }
@@ -90,12 +92,24 @@ pub enum PlanError {
         /// What was in the way last.
         region: Option<RegionId>,
     },
+    /// Called off, or the time was up before any clear path was found.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
     /// QAOA failed.
     #[error(transparent)]
-    Round(#[from] RoundError),
+    Round(RoundError),
     /// A position cannot be projected.
     #[error(transparent)]
     Projection(#[from] ProjectionError),
+}
+
+impl From<RoundError> for PlanError {
+    fn from(error: RoundError) -> Self {
+        match error {
+            RoundError::Stopped(reason) => Self::Stopped(reason),
+            error => Self::Round(error),
+        }
+    }
 }
 
 /// Plans legs; keeps the QAOA engines from leg to leg.
@@ -119,7 +133,9 @@ impl LegPlanner {
         &self.settings
     }
 
-    /// Plans one leg. `watch` is called after each round.
+    /// Plans one leg. `watch` is called after each round. The rounds get one of `parts` equal
+    /// parts of the time that `stop` leaves them: as many as there are legs still to be planned.
+    /// When that is over, the best clear path until then is the plan.
     ///
     /// # Errors
     /// [`PlanError`] with the reason where there is no path.
@@ -128,7 +144,8 @@ impl LegPlanner {
         request: &LegRequest,
         frame: &LocalFrame,
         space: &LegSpace<'_>,
-        cancelled: &AtomicBool,
+        stop: &Stop,
+        parts: usize,
         watch: impl FnMut(&Round),
     ) -> Result<LegOutcome, PlanError> {
         let (start, goal) = (frame.to_local(request.from)?, frame.to_local(request.to)?);
@@ -143,15 +160,13 @@ impl LegPlanner {
 
         let space = &space.with_edges_up_to(straight);
         let began = Instant::now();
-        let found = candidates(space, start, goal, &self.settings, cancelled);
-        if cancelled.load(Ordering::Relaxed) {
-            return Err(RoundError::Cancelled.into());
-        }
+        let found = candidates(space, start, goal, &self.settings, stop);
         let mut times = LegTimes { candidates: began.elapsed(), ..LegTimes::default() };
-        if !found.iter().any(|candidate| candidate.clear)
-            && let Some(proof) = enclosure(space, start, goal)
-        {
-            return Err(PlanError::Infeasible { goal: proof.goal, regions: proof.regions });
+        if !found.iter().any(|candidate| candidate.clear) {
+            stop.check()?;
+            if let Some(proof) = enclosure(space, start, goal) {
+                return Err(PlanError::Infeasible { goal: proof.goal, regions: proof.regions });
+            }
         }
 
         let began = Instant::now();
@@ -160,21 +175,24 @@ impl LegPlanner {
             lambda: self.settings.lambda.0,
             safety_margin: self.settings.buffer.0.max(0.1),
         };
-        let contest = Contest::new(&found[0], judge, &self.settings, &mut self.qaoa, cancelled);
-        let (path, rounds) = contest.run(&found[1..], watch)?;
+        let share = stop.share(parts);
+        let contest = Contest::new(&found[0], judge, &self.settings, &mut self.qaoa, &share);
+        let Contested { path, rounds, cut_short } = contest.run(&found[1..], watch)?;
         times.qaoa = began.elapsed();
 
         let began = Instant::now();
         let path = with_few_corners(&path, space, WORTH_OF_FEW);
         let finished = finished(&path, (request.from, request.to), frame, space).map_err(
             |error| match error {
+                FinishError::NotClear(_) if cut_short => Stopped::DeadlinePassed.into(),
                 FinishError::NotClear(region) => PlanError::NotFound { region: Some(region) },
                 FinishError::Projection(cause) => cause.into(),
             },
         )?;
         reaches_are_clear(request, space, &finished.points)?;
         times.finish = began.elapsed();
-        Ok(LegOutcome::Replanned(Box::new(LegPlan { finished, candidates: found, rounds, times })))
+        let plan = LegPlan { finished, candidates: found, rounds, cut_short, times };
+        Ok(LegOutcome::Replanned(Box::new(plan)))
     }
 }
 

@@ -4,8 +4,6 @@
 //! distinct bitstring, and keeps the cheapest clean path. The incumbent (the all-zeros string) is
 //! always judged too, so a round never makes the path worse.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -21,6 +19,7 @@ use crate::qaoa::{
     Angles, AnglesSource, Bits, EngineError, EngineKind, Ising, Qaoa, RunSettings, Scale, Settled,
     TrainSettings,
 };
+use crate::stop::{Stop, Stopped};
 
 /// What challenged the incumbent in a round.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -70,13 +69,13 @@ pub struct Round {
 pub enum RoundError {
     /// An engine would not run.
     #[error(transparent)]
-    Engine(#[from] EngineError),
+    Engine(EngineError),
     /// The costs of a trellis were not usable.
     #[error("the costs of the leg are not a usable Ising problem: {0}")]
     Ising(#[from] crate::qaoa::IsingError),
-    /// The plan was called off.
-    #[error("planning was cancelled")]
-    Cancelled,
+    /// The plan was called off, or its time is up.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
 }
 
 /// Refinement rounds at least, and rounds without progress before the end, where the number of
@@ -120,7 +119,27 @@ pub struct Contest<'a> {
     rounds: Vec<Round>,
     /// Rounds at most.
     budget: usize,
-    cancelled: &'a AtomicBool,
+    stop: &'a Stop,
+}
+
+/// What the rounds of a leg came to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Contested {
+    /// The incumbent at the end.
+    pub path: Vec<Xy>,
+    /// The rounds that were run to their end.
+    pub rounds: Vec<Round>,
+    /// Whether the deadline passed before the rounds had brought all that they could.
+    pub cut_short: bool,
+}
+
+impl From<EngineError> for RoundError {
+    fn from(error: EngineError) -> Self {
+        match error {
+            EngineError::Stopped(reason) => Self::Stopped(reason),
+            error => Self::Engine(error),
+        }
+    }
 }
 
 impl<'a> Contest<'a> {
@@ -131,7 +150,7 @@ impl<'a> Contest<'a> {
         judge: EdgeJudge<'a>,
         settings: &'a Settings,
         qaoa: &'a mut Qaoa,
-        cancelled: &'a AtomicBool,
+        stop: &'a Stop,
     ) -> Self {
         Self {
             judge,
@@ -142,11 +161,12 @@ impl<'a> Contest<'a> {
             angles: [None, None],
             rounds: Vec::new(),
             budget: 0,
-            cancelled,
+            stop,
         }
     }
 
-    /// Runs all rounds: each other candidate once, then refinements.
+    /// Runs all rounds: each other candidate once, then refinements. A deadline that passes ends
+    /// them with what they have brought.
     ///
     /// # Errors
     /// [`RoundError`] where an engine fails or the plan is cancelled.
@@ -154,13 +174,26 @@ impl<'a> Contest<'a> {
         mut self,
         others: &[Candidate],
         mut watch: impl FnMut(&Round),
-    ) -> Result<(Vec<Xy>, Vec<Round>), RoundError> {
+    ) -> Result<Contested, RoundError> {
+        let cut_short = match self.all_rounds(others, &mut watch) {
+            Ok(()) => false,
+            Err(RoundError::Stopped(Stopped::DeadlinePassed)) => true,
+            Err(error) => return Err(error),
+        };
+        Ok(Contested { path: self.incumbent, rounds: self.rounds, cut_short })
+    }
+
+    fn all_rounds(
+        &mut self,
+        others: &[Candidate],
+        watch: &mut impl FnMut(&Round),
+    ) -> Result<(), RoundError> {
         self.budget = match self.settings.rounds {
             Rounds::Auto => MOST_ROUNDS.max(others.len() + LEAST_REFINEMENTS),
             Rounds::AtMost(rounds) => rounds as usize,
         };
         for other in others {
-            self.challenge(other.points.clone(), &mut watch)?;
+            self.challenge(other.points.clone(), watch)?;
         }
         // Candidates from the grid are rough: the one that is best once it is taut need not be
         // the one that is best now. Those that pass obstacles on other sides get their chance.
@@ -175,16 +208,17 @@ impl<'a> Contest<'a> {
                     continue;
                 }
                 if seen.len() == 1 {
-                    self.refine(TRIAL, &mut watch)?;
+                    self.refine(TRIAL, watch)?;
                 }
                 seen.push(other.points.clone());
                 let champion = std::mem::replace(&mut self.incumbent, other.points.clone());
-                self.refine(TRIAL, &mut watch)?;
-                self.challenge(champion, &mut watch)?;
+                let trial = self.refine(TRIAL, watch);
+                // Also when the trial was stopped the cheaper of the two stays.
+                let back = self.challenge(champion, watch);
+                trial.and(back)?;
             }
         }
-        self.refine(usize::MAX, &mut watch)?;
-        Ok((self.incumbent, self.rounds))
+        self.refine(usize::MAX, watch)
     }
 
     /// A route round against another polyline; the cheaper of the two is the incumbent.
@@ -244,9 +278,7 @@ impl<'a> Contest<'a> {
         to: Vec<Xy>,
         watch: &mut impl FnMut(&Round),
     ) -> Result<(), RoundError> {
-        if self.cancelled.load(Ordering::Relaxed) {
-            return Err(RoundError::Cancelled);
-        }
+        self.stop.check()?;
         if self.rounds.len() >= self.budget {
             return Ok(());
         }
@@ -257,7 +289,7 @@ impl<'a> Contest<'a> {
         let penalty = trellis.penalty();
         let ising: Ising = trellis.ising(penalty)?.into();
         let settings = self.run_settings(kind);
-        let run = self.qaoa.run(&ising, &settings)?;
+        let run = self.qaoa.run(&ising, &settings, self.stop)?;
 
         let zeros = Bits::zeros(trellis.qubits());
         let cost = |bits: &Bits| trellis.path_edges(bits).map(|edge| edge.cost()).sum::<f64>();

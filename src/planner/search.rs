@@ -8,7 +8,6 @@
 
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap, HashMap};
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use geo::{Intersects, Line};
 use rstar::{AABB, RTree};
@@ -20,6 +19,7 @@ use super::sweep::{Cone, Sight, sweep};
 use crate::airspace::RegionId;
 use crate::airspace::space::Boundary;
 use crate::geodesy::Xy;
+use crate::stop::Stop;
 
 /// Corners and edges of one leg, found when they are needed and kept between searches.
 pub struct CornerSearch<'a> {
@@ -37,7 +37,7 @@ pub struct CornerSearch<'a> {
     along: Option<(Vec<Xy>, f64)>,
     /// What bars the edge between two corners.
     tested: HashMap<(u32, u32), Option<RegionId>>,
-    cancelled: &'a AtomicBool,
+    stop: &'a Stop,
 }
 
 /// A path over corners.
@@ -120,15 +120,9 @@ struct Pass {
 
 impl<'a> CornerSearch<'a> {
     /// Prepares the search for a leg, with corners rounded by points `step` radians apart;
-    /// `cancelled` ends it early, without a path.
+    /// `stop` ends it early, with what it has.
     #[must_use]
-    pub fn new(
-        space: LegSpace<'a>,
-        start: Xy,
-        goal: Xy,
-        step: f64,
-        cancelled: &'a AtomicBool,
-    ) -> Self {
+    pub fn new(space: LegSpace<'a>, start: Xy, goal: Xy, step: f64, stop: &'a Stop) -> Self {
         let regions = space.airspace().outlines().len();
         let mut boundaries: Vec<Vec<Boundary>> = vec![Vec::new(); regions];
         for (region, boundary) in space.airspace().boundaries() {
@@ -150,7 +144,7 @@ impl<'a> CornerSearch<'a> {
             step,
             along: None,
             tested: HashMap::new(),
-            cancelled,
+            stop,
         };
         search.sights.insert(Sight::Corner(START, start));
         let on_the_way: BTreeSet<RegionId> = space
@@ -180,7 +174,7 @@ impl<'a> CornerSearch<'a> {
             step,
             along: Some((path.points.clone(), beside)),
             tested: HashMap::new(),
-            cancelled: self.cancelled,
+            stop: self.stop,
         };
         finer.sights.insert(Sight::Corner(START, self.corners[0].point));
         let passed: BTreeSet<RegionId> = path.corners.iter().map(|corner| corner.region).collect();
@@ -269,7 +263,7 @@ impl<'a> CornerSearch<'a> {
         let mut popped = 0u32;
         while let Some(Reverse(offer)) = pass.open.pop() {
             popped = popped.wrapping_add(1);
-            if popped.is_multiple_of(256) && self.cancelled.load(Ordering::Relaxed) {
+            if popped.is_multiple_of(16) && self.stop.is_stopped() {
                 return None;
             }
             if !pass.is_news(offer.to, offer.so_far) {

@@ -9,6 +9,7 @@ use thiserror::Error;
 
 use super::angles::Angles;
 use super::bits::Bits;
+use crate::stop::Stopped;
 
 /// Which simulator runs a circuit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -104,6 +105,9 @@ pub enum EngineError {
         /// The most it takes.
         limit: usize,
     },
+    /// The run was called off, or its time is up.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
     /// A bitstring of another length than the problem.
     #[error("a bitstring of {found} bits for {expected} qubits")]
     BitsLength {

@@ -12,6 +12,7 @@ use super::ising::{Ising, Scale};
 use super::statevector::{Precision, StatevectorEngine};
 use super::train::{TrainSettings, Training, train};
 use super::viterbi::exact_optimum;
+use crate::stop::Stop;
 
 /// Where the angles of a run come from.
 #[derive(Debug, Clone, PartialEq)]
@@ -125,15 +126,24 @@ impl Qaoa {
     /// One run.
     ///
     /// # Errors
-    /// If no engine can run the circuit.
-    pub fn run(&mut self, ising: &Ising, settings: &RunSettings) -> Result<QaoaRun, EngineError> {
+    /// If no engine can run the circuit, or `stop` says so between two steps.
+    pub fn run(
+        &mut self,
+        ising: &Ising,
+        settings: &RunSettings,
+        stop: &Stop,
+    ) -> Result<QaoaRun, EngineError> {
         let scaled = ising.scaled(settings.scale);
         let engine = self.engine(&scaled.ising, settings.engine)?;
 
         let mut gradient = None;
         let training = match &settings.angles {
-            AnglesSource::Ramp(layers) => train(engine, Angles::ramp(*layers), &settings.train)?,
-            AnglesSource::CarriedOver(start) => train(engine, start.clone(), &settings.train)?,
+            AnglesSource::Ramp(layers) => {
+                train(engine, Angles::ramp(*layers), &settings.train, stop)?
+            }
+            AnglesSource::CarriedOver(start) => {
+                train(engine, start.clone(), &settings.train, stop)?
+            }
             AnglesSource::Given(angles) => {
                 let (expectation, mut slopes) = engine.expectation_and_gradient(angles)?;
                 slopes.iter_mut().for_each(|slope| *slope *= scaled.factor);

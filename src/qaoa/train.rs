@@ -3,6 +3,7 @@
 use super::adam::Adam;
 use super::angles::Angles;
 use super::engine::{Engine, EngineError};
+use crate::stop::Stop;
 
 /// How a circuit is trained. Losses are in the units of the engine's (scaled) problem.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,11 +46,13 @@ pub struct Training {
 /// Trains from `start`.
 ///
 /// # Errors
-/// Whatever the engine cannot do with a circuit of that many layers.
+/// Whatever the engine cannot do with a circuit of that many layers; [`EngineError::Stopped`] when
+/// `stop` says so between two steps.
 pub fn train(
     engine: &mut dyn Engine,
     start: Angles,
     settings: &TrainSettings,
+    stop: &Stop,
 ) -> Result<Training, EngineError> {
     let mut adam = Adam::new(settings.learning_rate, start.layers());
     let mut angles = start.clone();
@@ -57,6 +60,7 @@ pub fn train(
     let mut settled_at = f64::INFINITY;
     let mut waited = 0;
     loop {
+        stop.check()?;
         let finished = best.loss.len() == settings.steps;
         let (loss, gradient) = if finished {
             (engine.expectation(&angles)?, None)
@@ -100,7 +104,8 @@ mod tests {
 
     #[test]
     fn training_lowers_the_loss_and_keeps_the_whole_curve() {
-        let training = train(&mut engine(), Angles::ramp(3), &TrainSettings::default()).unwrap();
+        let training =
+            train(&mut engine(), Angles::ramp(3), &TrainSettings::default(), &Stop::new()).unwrap();
         assert_eq!(training.loss.len(), 61);
         assert!(training.expectation < training.loss[0] - 0.1);
         let lowest = training.loss.iter().copied().fold(f64::INFINITY, f64::min);
@@ -110,12 +115,13 @@ mod tests {
 
     #[test]
     fn carried_over_angles_settle_in_fewer_steps_and_never_end_worse() {
-        let first = train(&mut engine(), Angles::ramp(3), &TrainSettings::default()).unwrap();
+        let first =
+            train(&mut engine(), Angles::ramp(3), &TrainSettings::default(), &Stop::new()).unwrap();
         let settings = TrainSettings {
             settled: Some(Settled { window: 3, tolerance: 1e-2 }),
             ..TrainSettings::default()
         };
-        let second = train(&mut engine(), first.angles.clone(), &settings).unwrap();
+        let second = train(&mut engine(), first.angles.clone(), &settings, &Stop::new()).unwrap();
         assert!(second.loss.len() < 20);
         assert!(second.expectation <= first.expectation + 1e-12);
     }
@@ -123,7 +129,7 @@ mod tests {
     #[test]
     fn no_steps_at_all_only_evaluates_the_start() {
         let settings = TrainSettings { steps: 0, ..TrainSettings::default() };
-        let training = train(&mut engine(), Angles::ramp(2), &settings).unwrap();
+        let training = train(&mut engine(), Angles::ramp(2), &settings, &Stop::new()).unwrap();
         assert_eq!(training.loss, [training.expectation]);
         assert_eq!(training.angles, Angles::ramp(2));
     }

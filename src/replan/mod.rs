@@ -16,6 +16,8 @@ pub mod judge;
 pub mod plan;
 pub mod reason;
 
+use std::time::Duration;
+
 use crate::fence::{FenceSet, InclusionRule, VehicleRules};
 use crate::geodesy::{LatLon, Zone};
 use crate::mission::{Autopilot, FlightContext, LoiterHabit, Mission};
@@ -24,7 +26,7 @@ use crate::planner::Settings;
 pub use altitudes::Vertical;
 pub use field::{Field, FieldError};
 pub use judge::{LegVerdict, Verdict, fields, judge};
-pub use plan::{LegRecord, Progress, Replanned, replan};
+pub use plan::{LegRecord, Progress, Replanned, Stage, replan};
 pub use reason::ReplanError;
 
 /// What a mission is judged or planned with.
@@ -65,6 +67,8 @@ pub struct Options {
     pub zone: Option<Zone>,
     /// What several inclusions mean together.
     pub inclusion: InclusionRule,
+    /// How long planning may take; when that is over, the best clear path until then is used.
+    pub deadline: Option<Duration>,
     /// How heights are compared with altitudes.
     pub vertical: Vertical,
     /// What the vehicle's parameters say; empty without a vehicle.

@@ -1,7 +1,7 @@
 //! Re-planning: the legs that are not clear get waypoints, the result is judged again.
 
 use std::collections::BTreeSet;
-use std::sync::atomic::AtomicBool;
+use std::fmt;
 
 use super::field::{Field, Fields};
 use super::judge::{LegVerdict, Verdict, can_be_replanned, judge, verdict};
@@ -15,26 +15,50 @@ use crate::planner::candidates::Candidate;
 use crate::planner::leg::{LegRequest, LegTimes};
 use crate::planner::rounds::Round;
 use crate::planner::{LegOutcome, LegPlan, LegPlanner};
+use crate::stop::Stop;
 
 /// What happens while a mission is planned.
-#[derive(Debug, Clone)]
-pub enum Progress<'a> {
-    /// A leg that is not clear is taken on.
-    Leg {
-        /// Which of the legs to re-plan, from 1.
-        number: usize,
-        /// How many there are.
-        of: usize,
-        /// Its name.
-        name: String,
-    },
-    /// A QAOA round of that leg has ended.
+#[derive(Debug, Clone, Copy)]
+pub struct Progress<'a> {
+    /// Which of the legs to re-plan, from 1.
+    pub leg: usize,
+    /// How many there are.
+    pub legs: usize,
+    /// The leg's name.
+    pub name: &'a str,
+    /// How far it is.
+    pub stage: Stage<'a>,
+}
+
+/// How far a leg is.
+#[derive(Debug, Clone, Copy)]
+pub enum Stage<'a> {
+    /// Candidates are being looked for.
+    Candidates,
+    /// A QAOA round has ended.
     Round {
         /// Its number, from 1.
         number: usize,
         /// Its record.
         round: &'a Round,
     },
+    /// The leg has its path.
+    Planned,
+}
+
+impl fmt::Display for Progress<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { leg, legs, name, stage } = self;
+        write!(f, "leg {leg}/{legs} ({name}): ")?;
+        match stage {
+            Stage::Candidates => f.write_str("looking for candidates"),
+            Stage::Round { number, round } => {
+                let loss = round.loss.last().copied().unwrap_or(f64::NAN);
+                write!(f, "round {number}, loss {loss:.1}, length {:.1} m", round.length)
+            }
+            Stage::Planned => f.write_str("planned"),
+        }
+    }
 }
 
 /// A leg that was re-planned. Points are in the local metres of its zone.
@@ -52,6 +76,8 @@ pub struct LegRecord {
     pub candidates: Vec<Candidate>,
     /// The QAOA rounds.
     pub rounds: Vec<Round>,
+    /// Whether the deadline passed before these had brought all that they could.
+    pub cut_short: bool,
     /// Where the time went.
     pub times: LegTimes,
 }
@@ -81,19 +107,37 @@ impl Replanned {
     pub fn is_changed(&self) -> bool {
         !self.inserted.is_empty()
     }
+
+    /// What was used instead of what was asked for, and why; `None` where nothing was.
+    #[must_use]
+    pub fn fallback(&self) -> Option<String> {
+        let cut: Vec<String> = self
+            .legs
+            .iter()
+            .filter(|record| record.cut_short)
+            .map(|record| {
+                let (name, rounds) = (record.leg.name(), record.rounds.len());
+                let plural = if rounds == 1 { "" } else { "s" };
+                format!("the {name} has the best clear path after {rounds} QAOA round{plural}")
+            })
+            .collect();
+        (!cut.is_empty()).then(|| format!("the deadline passed: {}", cut.join("; ")))
+    }
 }
 
 /// Plans a mission: every leg that is not clear is re-planned, the waypoints are spliced in, and
-/// the new mission is judged from its integers.
+/// the new mission is judged from its integers. `stop` calls it off; the deadline of the options
+/// counts from now.
 ///
 /// # Errors
 /// [`ReplanError`] with the reason where there is no safe mission.
 pub fn replan(
     input: &Input<'_>,
     options: &Options,
-    cancelled: &AtomicBool,
+    stop: &Stop,
     mut watch: impl FnMut(Progress<'_>),
 ) -> Result<Replanned, ReplanError> {
+    let stop = options.deadline.map_or_else(|| stop.clone(), |time| stop.within(time));
     let flown = legs(input.mission, &input.context(options.loiter))?;
     let fields = Fields::new(&flown.legs, input, options)?;
     let before = verdict(&flown, &fields, options)?;
@@ -105,7 +149,9 @@ pub fn replan(
     for (k, &index) in blocked.iter().enumerate() {
         let leg = &flown.legs[index];
         let name = leg.name().to_string();
-        watch(Progress::Leg { number: k + 1, of: blocked.len(), name });
+        let legs = blocked.len();
+        let mut tell = |stage: Stage<'_>| watch(Progress { leg: k + 1, legs, name: &name, stage });
+        tell(Stage::Candidates);
         let view = fields
             .of(leg)
             .ok_or_else(|| ReplanError::unjudged(leg, "its zone was not prepared"))?;
@@ -118,15 +164,16 @@ pub fn replan(
         let space = view.leg_space(options.settings.buffer.0, request.from, request.to);
         let mut number = 0;
         let outcome = planner
-            .plan(&request, view.frame, &space, cancelled, |round| {
+            .plan(&request, view.frame, &space, &stop, legs - k, |round| {
                 number += 1;
-                watch(Progress::Round { number, round });
+                tell(Stage::Round { number, round });
             })
             .map_err(|error| {
                 ReplanError::from_plan(error, leg, &|region| fields.name(region).to_owned())
             })?;
+        tell(Stage::Planned);
         if let LegOutcome::Replanned(plan) = outcome {
-            let LegPlan { finished, candidates, rounds, times } = *plan;
+            let LegPlan { finished, candidates, rounds, cut_short, times } = *plan;
             detours.push(Detour { leg: index, waypoints: finished.waypoints.clone() });
             records.push(LegRecord {
                 leg: *leg,
@@ -135,6 +182,7 @@ pub fn replan(
                 points: finished.points,
                 candidates,
                 rounds,
+                cut_short,
                 times,
             });
         }

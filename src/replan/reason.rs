@@ -6,6 +6,7 @@ use crate::geodesy::ProjectionError;
 use crate::mission::{Leg, LegError, SpliceError};
 use crate::planner::PlanError;
 use crate::planner::rounds::RoundError;
+use crate::stop::Stopped;
 
 /// Why a mission could not be judged or planned. The mission is untouched in every case.
 #[derive(Debug, thiserror::Error)]
@@ -88,6 +89,15 @@ pub enum ReplanError {
         /// What happened.
         cause: RoundError,
     },
+    /// The time was up before a leg had any safe path.
+    #[error(
+        "the deadline passed before a safe path was found for the {leg}; give more time with \
+         --deadline"
+    )]
+    DeadlinePassed {
+        /// The leg's name.
+        leg: String,
+    },
     /// Planning was called off.
     #[error("planning was cancelled")]
     Cancelled,
@@ -108,6 +118,7 @@ impl ReplanError {
             Self::Unjudged { .. }
                 | Self::Infeasible { .. }
                 | Self::NotFound { .. }
+                | Self::DeadlinePassed { .. }
                 | Self::Fixed { .. }
                 | Self::Altitude { .. }
                 | Self::Limit { .. }
@@ -155,7 +166,8 @@ impl ReplanError {
                 let why = format!("{hit}try a finer --grid, more --qubits or another --seed");
                 Self::NotFound { leg, why }
             }
-            PlanError::Round(RoundError::Cancelled) => Self::Cancelled,
+            PlanError::Stopped(Stopped::Cancelled) => Self::Cancelled,
+            PlanError::Stopped(Stopped::DeadlinePassed) => Self::DeadlinePassed { leg },
             PlanError::Round(cause) => Self::Qaoa { leg, cause },
             PlanError::Projection(cause) => cause.into(),
         }

@@ -11,8 +11,6 @@ pub struct Run<'a> {
     pub options: &'a Options,
     /// What was odd about the input, a sentence each, besides what the verdict says itself.
     pub warnings: &'a [String],
-    /// What was used instead of what was asked for, and why.
-    pub fallback: Option<&'a str>,
     /// The time that reading the input took.
     pub load: Duration,
     /// The time of the whole run.

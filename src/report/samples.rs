@@ -1,12 +1,12 @@
 //! Planned and judged missions for the tests of the reports, from `fence_examples`.
 
-use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use super::Run;
 use crate::formats::{Scenario, read_scenario};
 use crate::geodesy::LatLon;
 use crate::replan::{Field, Input, Options, Replanned, Verdict, fields, judge, replan};
+use crate::stop::Stop;
 
 /// A field to stay inside with a pond; two legs go through the pond.
 pub(super) const POND: &str = include_str!("../../fence_examples/inclusion-with-hole.plan");
@@ -29,15 +29,13 @@ fn with_input<T>(scenario: &Scenario, use_it: impl FnOnce(&Input<'_>) -> T) -> T
 }
 
 pub(super) fn planned(plan: &str, options: &Options) -> Replanned {
-    with_input(&scenario(plan), |input| {
-        replan(input, options, &AtomicBool::new(false), |_| {}).unwrap()
-    })
+    with_input(&scenario(plan), |input| replan(input, options, &Stop::new(), |_| {}).unwrap())
 }
 
 /// The same mission without its fences: nothing to keep away from.
 pub(super) fn planned_without_fences(plan: &str, options: &Options) -> Replanned {
     let scenario = Scenario { fences: Default::default(), ..scenario(plan) };
-    with_input(&scenario, |input| replan(input, options, &AtomicBool::new(false), |_| {}).unwrap())
+    with_input(&scenario, |input| replan(input, options, &Stop::new(), |_| {}).unwrap())
 }
 
 /// The barn in the way out and in the way back, which may end at home or at a rally point 30 m
@@ -50,7 +48,7 @@ pub(super) fn planned_there_and_back(options: &Options) -> Replanned {
     let rally = [LatLon::new(home.lat(), home.lon() - 4e-4).unwrap()];
     with_input(&scenario, |input| {
         let input = Input { rally: &rally, ..*input };
-        replan(&input, options, &AtomicBool::new(false), |_| {}).unwrap()
+        replan(&input, options, &Stop::new(), |_| {}).unwrap()
     })
 }
 
@@ -62,5 +60,5 @@ pub(super) fn judged(plan: &str, options: &Options) -> (Verdict, Vec<Field>) {
 
 pub(super) fn run<'a>(options: &'a Options, warnings: &'a [String]) -> Run<'a> {
     let (load, total) = (Duration::from_micros(1234), Duration::from_millis(98));
-    Run { options, warnings, fallback: None, load, total }
+    Run { options, warnings, load, total }
 }

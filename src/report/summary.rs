@@ -57,7 +57,8 @@ pub fn plan_summary(result: &Replanned, run: &Run<'_>) -> String {
     }
     let notes: Vec<String> = result.notes.iter().map(ToString::to_string).collect();
     heights(&mut out, before);
-    remarks(&mut out, run, before.warnings.iter().chain(&notes));
+    let fallback = result.fallback();
+    remarks(&mut out, fallback, run, before.warnings.iter().chain(&notes));
     out
 }
 
@@ -154,17 +155,22 @@ pub fn check_summary(verdict: &Verdict, run: &Run<'_>) -> String {
         push_wrapped(&mut out, &finding(leg), 4);
     }
     heights(&mut out, verdict);
-    remarks(&mut out, run, &verdict.warnings);
+    remarks(&mut out, None, run, &verdict.warnings);
     out
 }
 
 /// The fallback and the warnings.
-fn remarks<'a>(out: &mut String, run: &Run<'a>, warnings: impl IntoIterator<Item = &'a String>) {
+fn remarks<'a>(
+    out: &mut String,
+    fallback: Option<String>,
+    run: &Run<'a>,
+    warnings: impl IntoIterator<Item = &'a String>,
+) {
     let mut remarks = Vec::new();
     let rules = &run.options.rules;
     remarks.extend(rules.applied.iter().map(|text| format!("vehicle fence: {text}")));
     remarks.extend(rules.missing.iter().map(|text| format!("warning: vehicle fence: {text}")));
-    remarks.extend(run.fallback.map(|fallback| format!("fallback: {fallback}")));
+    remarks.extend(fallback.map(|fallback| format!("fallback: {fallback}")));
     remarks.extend(run.warnings.iter().chain(warnings).map(|text| format!("warning: {text}")));
     if !remarks.is_empty() {
         out.push('\n');
@@ -219,14 +225,13 @@ mod tests {
     #[test]
     fn fallback_and_warnings_fit_whatever_they_hold() {
         let options = Options::default();
-        let result = samples::planned_without_fences(BARN, &options);
+        let mut result = samples::planned(BARN, &options);
+        result.legs.iter_mut().for_each(|record| record.cut_short = true);
         let warnings =
             [format!("a file called {} is\todd\u{1b}[31m", "long".repeat(60)), "short".to_owned()];
-        let fallback = Some("the statevector engine instead of ibm: no token");
-        let run = Run { fallback, ..samples::run(&options, &warnings) };
-        let text = plan_summary(&result, &run);
+        let text = plan_summary(&result, &samples::run(&options, &warnings));
         fits(&text);
-        assert!(text.contains("fallback: the statevector engine"), "{text}");
+        assert!(text.contains("fallback: the deadline passed: the leg from item"), "{text}");
         assert!(text.contains("warning: short"), "{text}");
     }
 

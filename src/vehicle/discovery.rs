@@ -13,6 +13,7 @@ use super::Vehicle;
 use super::state::{VehicleState, command, follow};
 use super::timing::Timing;
 use crate::link::message::Heartbeat;
+use crate::link::signing::Rejection;
 use crate::link::{ComponentId, Inbox, Link, LinkError, Node, Received, SystemId};
 use crate::mission;
 
@@ -129,7 +130,7 @@ pub enum DiscoveryError {
         "no autopilot was heard within {} s{}; {}",
         waited.as_secs(),
         wanted.map(|id| format!(" with system id {id}")).unwrap_or_default(),
-        heard_hint(heard)
+        heard_hint(heard, refused)
     )]
     NotFound {
         /// The system that was looked for, if a certain one was.
@@ -138,6 +139,8 @@ pub enum DiscoveryError {
         waited: Duration,
         /// Who else was heard.
         heard: Vec<Node>,
+        /// Frames that were dropped for their signature.
+        refused: BTreeMap<Rejection, u64>,
     },
     /// More than one vehicle, and none was chosen.
     #[error(
@@ -157,7 +160,15 @@ fn list<T: fmt::Display>(items: &[T]) -> String {
     items.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
 
-fn heard_hint(heard: &[Node]) -> String {
+fn heard_hint(heard: &[Node], refused: &BTreeMap<Rejection, u64>) -> String {
+    if !refused.is_empty() {
+        let counts: Vec<_> =
+            refused.iter().map(|(reason, count)| format!("{count} {reason}")).collect();
+        return format!(
+            "frames were dropped ({}): see that the signing key is the vehicle's",
+            counts.join(", ")
+        );
+    }
     if heard.is_empty() {
         return "nothing at all was heard: see that the vehicle is on, and that port and baud rate \
                 are right"
@@ -184,7 +195,7 @@ pub async fn find(link: &Link, search: &Search) -> Result<Vehicle, DiscoveryErro
     let (received, heartbeat) = first_autopilot(&mut inbox, search).await?;
     let node = received.from;
     if let Some(address) = received.peer {
-        link.pin_peer(address);
+        link.pin_peer(address, node.system);
     }
     link.adopt_system(node.system);
     let autopilot = Autopilot::from(heartbeat.autopilot);
@@ -238,6 +249,7 @@ async fn first_autopilot(
         wanted: search.system,
         waited: search.patience,
         heard: others,
+        refused: inbox.link().refused(),
     })
 }
 

@@ -12,7 +12,6 @@ mod oracle;
 mod plane;
 mod scene;
 
-use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use quav::airspace::Airspace;
@@ -21,6 +20,7 @@ use quav::geodesy::{LatLonE7, LocalFrame, Zone};
 use quav::planner::leg::LegRequest;
 use quav::planner::leg_space::LegSpace;
 use quav::planner::{LegOutcome, LegPlan, LegPlanner, PlanError, Settings};
+use quav::stop::Stop;
 
 use generate::BUFFER;
 use scene::{Known, Scene};
@@ -49,13 +49,8 @@ fn plan(
     let latitude = if a.lat().abs() > b.lat().abs() { a.lat() } else { b.lat() };
     let space = LegSpace::new(&airspace, settings.buffer.0 * spread, latitude);
     let request = LegRequest { from: a, to: b, from_reach: 0.0, to_reach: 0.0 };
-    let outcome = LegPlanner::new(settings).plan(
-        &request,
-        &frame,
-        &space,
-        &AtomicBool::new(false),
-        |_| (),
-    )?;
+    let outcome =
+        LegPlanner::new(settings).plan(&request, &frame, &space, &Stop::new(), 1, |_| ())?;
     Ok(match outcome {
         LegOutcome::Clear => (vec![from, to], None),
         LegOutcome::Replanned(plan) => {

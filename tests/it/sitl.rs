@@ -9,7 +9,7 @@ use std::time::Duration;
 use quav::geodesy::LatLonE7;
 use quav::link::{Endpoint, Identity, Link, LinkTask, Transport};
 use quav::mission::{self, Frame, MissionItem, MissionType};
-use quav::vehicle::{Search, Vehicle, find};
+use quav::vehicle::{DiscoveryError, Search, Vehicle, find};
 use serde_json::{Value, json};
 use tokio_util::sync::CancellationToken;
 
@@ -121,9 +121,21 @@ pub(crate) struct Session {
 impl Session {
     pub(crate) async fn open(endpoint: &Endpoint, search: Search) -> Self {
         let transport = Transport::open(endpoint).await.unwrap();
+        Self::over(transport, &search).await.unwrap()
+    }
+
+    pub(crate) async fn over(
+        transport: Transport,
+        search: &Search,
+    ) -> Result<Self, DiscoveryError> {
         let (link, task) = Link::start(transport, Identity::default(), CancellationToken::new());
-        let vehicle = find(&link, &search).await.unwrap();
-        Self { vehicle, link, task }
+        match find(&link, search).await {
+            Ok(vehicle) => Ok(Self { vehicle, link, task }),
+            Err(error) => {
+                task.close().await;
+                Err(error)
+            }
+        }
     }
 
     pub(crate) async fn close(self) {

@@ -17,6 +17,7 @@ use crate::planner::trellis::{EdgeJudge, Trellis};
 use crate::qaoa::chain::ChainEngine;
 use crate::qaoa::train::train;
 use crate::qaoa::{Angles, Ising, Scale, TrainSettings};
+use crate::stop::Stop;
 use crate::units::Metres;
 
 /// The grids of A*, metres.
@@ -149,7 +150,7 @@ fn training_time(ising: &Ising, settings: &Settings) -> Result<Duration, CliErro
     let how = TrainSettings { steps, learning_rate: settings.learning_rate, settled: None };
     let mut failure = None;
     let time = fastest(|| {
-        if let Err(error) = train(&mut engine, Angles::ramp(settings.layers), &how) {
+        if let Err(error) = train(&mut engine, Angles::ramp(settings.layers), &how, &Stop::new()) {
             failure = Some(error);
         }
     });

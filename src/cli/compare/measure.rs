@@ -1,6 +1,5 @@
 //! Every method on the legs of a scenario. The clock is here; the methods themselves have none.
 
-use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
@@ -12,6 +11,7 @@ use crate::planner::leg::LegRequest;
 use crate::planner::leg_space::LegSpace;
 use crate::planner::{LegOutcome, LegPlanner, Settings};
 use crate::report::json::leg::RoundDocument;
+use crate::stop::Stop;
 use crate::units::Metres;
 
 /// A path that keeps all of the buffer but this much is not said to collide, metres: positions are
@@ -172,7 +172,7 @@ fn quav(settings: &Settings, task: &LegTask, space: &LegSpace<'_>) -> Attempt {
     let request = LegRequest { from: task.from, to: task.to, from_reach: 0.0, to_reach: 0.0 };
     let mut rounds = Vec::new();
     let path = LegPlanner::new(settings.clone())
-        .plan(&request, &task.frame, space, &AtomicBool::new(false), |round| {
+        .plan(&request, &task.frame, space, &Stop::new(), 1, |round| {
             rounds.push(RoundDocument::from(round));
         })
         .map(|outcome| match outcome {

@@ -1,5 +1,3 @@
-use std::sync::atomic::AtomicBool;
-
 use proptest::prelude::*;
 
 use super::*;
@@ -7,6 +5,7 @@ use crate::fence::{FenceRegion, FenceRole, FenceSet, FenceShape, VehicleRules};
 use crate::geodesy::{LatLon, LatLonE7};
 use crate::mission::{Autopilot, Frame, Home};
 use crate::replan::{Input, Verdict, judge, replan};
+use crate::stop::Stop;
 
 const NORTH: f64 = 111_132.0 * 1e-7;
 
@@ -168,7 +167,7 @@ fn only_the_legs_that_are_too_low_are_given_waypoints() {
     let high = [(0.0, 0.0, 80.0), (0.0, 400.0, 80.0), (0.0, 400.0, 30.0), (0.0, 0.0, 30.0)];
     let flown = mission(high.map(|at| item(16, 3, at)));
     let regions = fences(vec![block((0.0, 200.0), tall(GROUND, 40.0))]);
-    let done = replan(&input(&flown, &regions), &even(), &AtomicBool::new(false), |_| {}).unwrap();
+    let done = replan(&input(&flown, &regions), &even(), &Stop::new(), |_| {}).unwrap();
     assert_eq!(done.legs.len(), 1);
     assert_eq!(done.legs[0].leg.from.item, Some(2));
     assert!(done.inserted.iter().all(|index| *index > 2));
@@ -197,7 +196,7 @@ fn a_leg_above_or_below_the_altitude_limits_is_found_and_refused() {
         let verdict = judge(&input(mission, &none), options).unwrap();
         let findings: Vec<_> = verdict.legs.iter().filter_map(|leg| leg.limit).collect();
         assert_eq!(verdict.is_clear(), findings.is_empty());
-        let planned = replan(&input(mission, &none), options, &AtomicBool::new(false), |_| {});
+        let planned = replan(&input(mission, &none), options, &Stop::new(), |_| {});
         match (findings.first(), planned) {
             (None, Ok(_)) => String::new(),
             (Some(finding), Err(ReplanError::Altitude { .. })) => finding.to_string(),
@@ -342,7 +341,7 @@ proptest! {
     fn no_planned_mission_comes_near_to_an_obstacle((blocks, flight) in scene()) {
         let flown = mission(flight.iter().map(|&at| item(16, 3, at)));
         let regions = with_blocks(&blocks);
-        match replan(&input(&flown, &regions), &even(), &AtomicBool::new(false), |_| {}) {
+        match replan(&input(&flown, &regions), &even(), &Stop::new(), |_| {}) {
             Ok(planned) => prop_assert_eq!(too_near(&planned.mission.items, &blocks, 5.0), None),
             Err(error) => prop_assert!(error.is_no_path(), "{}", error),
         }

@@ -45,6 +45,8 @@ pub struct SettingsDocument {
     pub zone: String,
     /// What several inclusions mean together.
     pub inclusion: String,
+    /// How long planning may take, seconds.
+    pub deadline: Option<f64>,
     /// What legs keep from obstacles that they are flown over or under.
     pub vertical_margin: Metres,
     /// How far the ground may be above or below home; `null`: not said.
@@ -108,6 +110,7 @@ impl From<&Options> for SettingsDocument {
             full_training: settings.full_training,
             zone: options.zone.map_or_else(|| "auto".to_owned(), |zone| zone.to_string()),
             inclusion: options.inclusion.to_string(),
+            deadline: options.deadline.map(|time| time.as_secs_f64()),
             vertical_margin: options.vertical.margin,
             ground_relief: options.vertical.ground_relief,
             vehicle_fence: (&options.rules).into(),

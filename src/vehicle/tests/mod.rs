@@ -101,7 +101,7 @@ impl Drop for Peer {
 }
 
 async fn write<D: MessageData>(line: &Mutex<WriteHalf<DuplexStream>>, from: Node, message: &D) {
-    let frame = Packet::new(message).to_frame(from, 0);
+    let frame = Packet::new(message).to_frame(from, 0, None);
     // Fails where quavd has closed the line, which ends the test anyhow.
     let _ = line.lock().await.write_all(frame.raw_bytes()).await;
 }
