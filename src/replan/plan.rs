@@ -8,7 +8,7 @@ use super::judge::{LegVerdict, Verdict, can_be_replanned, judge, verdict};
 use super::reason::ReplanError;
 use super::{Input, Options};
 use crate::geodesy::{LatLonE7, Xy, Zone};
-use crate::mission::legs::LegShape;
+use crate::mission::legs::{LegKind, LegShape};
 use crate::mission::splice::SpliceNote;
 use crate::mission::{Detour, Leg, Mission, legs, splice};
 use crate::planner::candidates::Candidate;
@@ -204,6 +204,23 @@ pub fn replan(
     })
 }
 
+/// Why a leg cannot be re-planned, and what to do.
+fn why_fixed(leg: &Leg) -> &'static str {
+    match (leg.kind, leg.shape) {
+        (_, LegShape::Curved { .. }) => {
+            "waypoints would bend the curve; make its end a plain waypoint (NAV_WAYPOINT), which can \
+             be re-planned, or move it"
+        }
+        (LegKind::Stay, _) => "it is no stretch that could go round it; move it, or the fence",
+        (LegKind::Takeoff, _) => "nothing can be flown before a takeoff; move it, or the fence",
+        _ if leg.jump.is_some() => {
+            "waypoints for a jump would be flown without it, too; let the jump go to waypoints that \
+             lead round it, or move its ends or the fence"
+        }
+        _ => "no waypoint can be put into it; move its ends or the fence",
+    }
+}
+
 /// Why the new mission does not pass.
 fn not_verified(bad: &LegVerdict) -> ReplanError {
     let leg = bad.leg.name().to_string();
@@ -231,7 +248,7 @@ fn legs_to_replan(before: &Verdict) -> Result<Vec<usize>, ReplanError> {
         }
         let Some((region, _)) = &verdict.blocker else { continue };
         if !can_be_replanned(&verdict.leg) {
-            let why = "no waypoint can be put into it; move its ends or the fence".to_owned();
+            let why = why_fixed(&verdict.leg).to_owned();
             let (leg, region) = (verdict.leg.name().to_string(), region.clone());
             return Err(ReplanError::Fixed { leg, region, why });
         }

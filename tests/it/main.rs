@@ -8,6 +8,7 @@ mod campaign;
 mod commands;
 mod compare;
 mod deadline;
+mod limits;
 mod parameters;
 mod replacing;
 mod scenes;
