@@ -14,7 +14,9 @@ use super::curve::{arc_bound, bend_splines, spline_bound};
 use super::insertion::insertion_point;
 use super::item::{Command, MissionItem};
 use super::jumps::Jumps;
-use super::legs::{FlightContext, Leg, LegEnd, LegError, LegKind, LegShape, MissionLegs, ReturnTo};
+use super::legs::{
+    FlightContext, JumpInsertion, Leg, LegEnd, LegError, LegKind, LegShape, MissionLegs, ReturnTo,
+};
 use super::places::{places, radii, warning};
 use crate::geodesy::LatLon;
 use crate::units::Metres;
@@ -144,23 +146,17 @@ impl Itinerary<'_> {
                     self.set_home(index, state.position);
                     open.push(next);
                 }
-                Role::Jump | Role::TagJump => {
-                    open.push(next);
-                    let jump = state.jump.or(Some(index));
-                    let destinations = self.jumps.destinations(index);
-                    open.extend(destinations.iter().map(|&index| State {
-                        index,
-                        jump,
-                        jumped: true,
-                        ..state
-                    }));
-                    self.count(destinations.len())?;
-                }
+                Role::Jump | Role::TagJump => self.jump(state, &mut open)?,
                 Role::PathNotGiven => {
                     return Err(LegError::PathNotGiven { item: index, command: item.command });
                 }
                 Role::Hold => {
-                    open.push(State { navigation: Some(index), jumped: false, ..next });
+                    open.push(State {
+                        navigation: Some(index),
+                        jumped: false,
+                        by_jump: None,
+                        ..next
+                    });
                 }
                 Role::Return => self.fly_back(state, &mut open)?,
                 Role::Place(Destination::Takeoff) => {
@@ -170,6 +166,35 @@ impl Itinerary<'_> {
             }
         }
         Ok(())
+    }
+
+    /// At a jump: on to the next item, and to where it may lead. One that is always taken goes
+    /// nowhere else; if it leads on, past some items, it is no branch of the way either.
+    fn jump(&mut self, state: State, open: &mut Vec<State>) -> Result<(), LegError> {
+        let index = state.index;
+        let item = &self.items[index];
+        let always =
+            self.context.autopilot.always().is_some_and(|always| {
+                item.command.role() == Role::Jump && item.params[1] == always
+            });
+        if !always {
+            open.push(State { index: index + 1, ..state });
+        }
+        let destinations = self.jumps.destinations(index);
+        for &target in destinations {
+            let onward = always && target > index;
+            let first = !state.jumped && state.landing.is_none() && target < self.items.len();
+            let by_jump = self
+                .context
+                .autopilot
+                .always()
+                .filter(|_| first && item.command.role() == Role::Jump)
+                .map(|always| JumpInsertion { jump: index, target, always });
+            let jump = if onward { state.jump } else { state.jump.or(Some(index)) };
+            open.push(State { index: target, jump, jumped: true, by_jump, ..state });
+        }
+        let branches = destinations.len();
+        self.count(branches)
     }
 
     fn count(&mut self, steps: usize) -> Result<(), LegError> {
@@ -219,6 +244,7 @@ impl Itinerary<'_> {
             index: index + 1,
             navigation: Some(index),
             jumped: false,
+            by_jump: None,
             position,
             altitude: self.altitude(index, Destination::Takeoff),
             circle: Metres::ZERO,
@@ -247,7 +273,13 @@ impl Itinerary<'_> {
             }
             return Ok(None);
         }
-        let on = State { index: index + 1, navigation: Some(index), jumped: false, ..state };
+        let on = State {
+            index: index + 1,
+            navigation: Some(index),
+            jumped: false,
+            by_jump: None,
+            ..state
+        };
         match (state.status, destination) {
             (Status::Landed, _) => Ok(None),
             (Status::Before, _) => Ok(Some(on)),
@@ -273,7 +305,13 @@ impl Itinerary<'_> {
     fn fly_back(&mut self, state: State, open: &mut Vec<State>) -> Result<(), LegError> {
         let index = state.index;
         if state.status != Status::Flying {
-            let on = State { index: index + 1, navigation: Some(index), jumped: false, ..state };
+            let on = State {
+                index: index + 1,
+                navigation: Some(index),
+                jumped: false,
+                by_jump: None,
+                ..state
+            };
             open.push(on);
             return Ok(());
         }
@@ -342,11 +380,15 @@ impl Itinerary<'_> {
             },
             _ => None,
         };
+        let by_jump = match (kind, shape) {
+            (LegKind::Flown | LegKind::Return(_), LegShape::Straight) => state.by_jump,
+            _ => None,
+        };
         let kind = match (kind, state.landing) {
             (LegKind::Flown, Some(l)) => LegKind::Return(ReturnTo::LandingSequence(l.entry)),
             _ => kind,
         };
-        self.legs.push(Leg { from, to, kind, shape, jump: state.jump, insert_before });
+        self.legs.push(Leg { from, to, kind, shape, jump: state.jump, insert_before, by_jump });
         Ok(())
     }
 
@@ -378,6 +420,7 @@ impl Itinerary<'_> {
                 shape: LegShape::Straight,
                 jump: None,
                 insert_before: None,
+                by_jump: None,
             });
         }
     }

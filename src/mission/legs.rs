@@ -109,6 +109,24 @@ pub struct Leg {
     /// re-planned, only judged. Legs with the same number share the inserted waypoints: at most
     /// one of them can be re-planned, and the result decides about the others.
     pub insert_before: Option<usize>,
+    /// How waypoints can be put into a leg that is flown by a jump.
+    pub by_jump: Option<JumpInsertion>,
+}
+
+/// Waypoints for a leg that is flown by a jump stand before the jump's target. The jump goes to the
+/// first of them; another jump, always taken, leads whoever falls through past them:
+///
+/// > ..., `DO_JUMP` to the target, new waypoints, target, ..., `DO_JUMP` to the new waypoints, ...
+///
+/// So nothing but this jump flies them, and other jumps to the target still go there straight.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JumpInsertion {
+    /// The item that jumps.
+    pub jump: usize,
+    /// Where it jumps to.
+    pub target: usize,
+    /// The number of repeats (`param2`) that this autopilot takes for always.
+    pub always: f32,
 }
 
 /// What a message calls a leg.

@@ -188,7 +188,7 @@ fn leg_verdict(
 
 /// Whether a leg can be given waypoints.
 pub(super) fn can_be_replanned(leg: &Leg) -> bool {
-    leg.insert_before.is_some()
+    (leg.insert_before.is_some() || leg.by_jump.is_some())
         && leg.shape == LegShape::Straight
         && matches!(leg.kind, LegKind::Flown | LegKind::Return(_))
 }

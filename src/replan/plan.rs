@@ -233,6 +233,11 @@ fn not_verified(bad: &LegVerdict) -> ReplanError {
                        (NAV_WAYPOINT), or move it";
             ReplanError::Fixed { leg, region, why: why.to_owned() }
         }
+        // Several jumps to one place, or jumps behind each other.
+        _ if bad.leg.jump.is_some() => {
+            let why = why_fixed(&bad.leg).to_owned();
+            ReplanError::Fixed { leg, region, why }
+        }
         _ => ReplanError::NotVerified { leg, region },
     }
 }
@@ -253,7 +258,8 @@ fn legs_to_replan(before: &Verdict) -> Result<Vec<usize>, ReplanError> {
             return Err(ReplanError::Fixed { leg, region, why });
         }
         // The others that share the waypoints are decided by the judgement of the result.
-        if taken.insert(verdict.leg.insert_before) {
+        let leg = &verdict.leg;
+        if taken.insert((leg.insert_before, leg.by_jump.map(|by| by.target))) {
             blocked.push(index);
         }
     }

@@ -382,7 +382,7 @@ fn executed_stretches(mission: &Mission) -> Vec<(LatLon, LatLon, bool)> {
     let (mut here, mut stretches, mut jumped) = (None, Vec::new(), false);
     for stop in execute(&mission.items, 60) {
         let item = &mission.items[stop.item];
-        jumped |= stop.jumped;
+        jumped |= !stop.jumps.is_empty();
         let place = (item.x != 0 || item.y != 0).then(|| item.position().unwrap());
         match (item.command.0, here) {
             (20, Some(here)) => {

@@ -347,3 +347,35 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn the_way_back_by_a_jump_is_led_round_an_obstacle() {
+    let places = [(0.0, 0.0, 30.0), (250.0, 200.0, 30.0), (0.0, 400.0, 30.0)];
+    let mut items: Vec<MissionItem> = places.map(|at| item(16, 3, at)).to_vec();
+    items.push(MissionItem { params: [0.0, 3.0, 0.0, 0.0], ..item(177, 2, (0.0, 0.0, 0.0)) });
+    items.push(item(16, 3, (0.0, 700.0, 30.0)));
+    let patrol = mission(items);
+    let regions = fences(vec![block((0.0, 200.0), None)]);
+    let stop = Stop::new();
+    let planned = replan(&input(&patrol, &regions), &hovering(), &stop, |_| {}).unwrap();
+    assert_eq!(planned.legs.len(), 1);
+    assert!(planned.after.is_clear());
+    let new = &planned.mission.items;
+    let first = planned.inserted[0];
+    assert_eq!(new[first - 1].params[..2], [(first + planned.inserted.len()) as f32, -1.0]);
+    let back: Vec<MissionItem> = [new.len() - 3]
+        .into_iter()
+        .chain(planned.inserted.clone())
+        .chain([first + planned.inserted.len()])
+        .map(|index| new[index])
+        .collect();
+    assert_eq!(too_near(&back, &[((0.0, 200.0), 0.0, 1e4)], 0.0), None);
+    assert_eq!(planned.after.length(), planned.before.length(), "the way itself is as it was");
+    // Again there is nothing to do.
+    let again = replan(&input(&planned.mission, &regions), &hovering(), &stop, |_| {}).unwrap();
+    assert!(!again.is_changed());
+    // An autopilot that is not known may not know that jump either.
+    let unknown = Input { autopilot: Autopilot::Unknown, ..input(&patrol, &regions) };
+    let refused = replan(&unknown, &hovering(), &stop, |_| {}).unwrap_err();
+    assert!(refused.to_string().contains("by the jump at item 4"), "{refused}");
+}
