@@ -320,6 +320,7 @@ fn with_blocks(blocks: &[Block]) -> FenceSet {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]
     fn no_leg_that_is_judged_clear_comes_near_to_an_obstacle(
         (blocks, flight) in scene(), relief in 0.0..20.0_f64,
