@@ -3,10 +3,11 @@
 CARGO ?= cargo
 PYTHON ?= python3
 VENV := .venv
+VENV_IBM := .venv-ibm
 BIN := $(or $(CARGO_TARGET_DIR),target)/release/quavd
 PACKAGES := cmake g++ make pkg-config sqlite3 libsqlite3-dev python3-venv
 
-.PHONY: all build demo test test-rust test-python lint doc bench examples clean system
+.PHONY: all build demo test test-rust test-python test-ibm lint doc bench bench-link bench-ibm examples clean system
 
 all: build
 
@@ -28,6 +29,12 @@ $(VENV)/.ready: sitl/requirements.txt
 	$(VENV)/bin/pip install --quiet --disable-pip-version-check -r sitl/requirements.txt
 	touch $@
 
+# qiskit, for the tests of the circuits and for the stand-in of IBM's service.
+$(VENV_IBM)/.ready: sitl/requirements-ibm.txt $(VENV)/.ready
+	$(PYTHON) -m venv $(VENV_IBM)
+	$(VENV_IBM)/bin/pip install --quiet --disable-pip-version-check -r sitl/requirements-ibm.txt
+	touch $@
+
 build: system
 	$(CARGO) build --release --locked
 
@@ -35,19 +42,23 @@ build: system
 demo: build $(VENV)/.ready
 	$(VENV)/bin/python sitl/demo.py --quavd $(BIN) --scenario fence_examples/s1.plan --out out
 
-test: test-rust test-python
+test: test-rust test-python test-ibm
 
 # One runner where there is one; plain cargo test does the same.
-test-rust: system $(VENV)/.ready
+test-rust: system $(VENV)/.ready $(VENV_IBM)/.ready
 	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
-		QUAV_PYTHON=$(CURDIR)/$(VENV)/bin/python $(CARGO) nextest run --release --locked; \
+		QUAV_PYTHON=$(CURDIR)/$(VENV)/bin/python QUAV_IBM_PYTHON=$(CURDIR)/$(VENV_IBM)/bin/python $(CARGO) nextest run --release --locked; \
 	else \
-		QUAV_PYTHON=$(CURDIR)/$(VENV)/bin/python $(CARGO) test --release --locked; \
+		QUAV_PYTHON=$(CURDIR)/$(VENV)/bin/python QUAV_IBM_PYTHON=$(CURDIR)/$(VENV_IBM)/bin/python $(CARGO) test --release --locked; \
 	fi
 	$(CARGO) test --release --locked --doc
 
 test-python: $(VENV)/.ready
 	cd sitl && MAVLINK20=1 ../$(VENV)/bin/python -m unittest
+
+# What needs qiskit is in a folder of its own, which the unittest above does not look into.
+test-ibm: $(VENV_IBM)/.ready
+	cd sitl && ../$(VENV_IBM)/bin/python -m unittest discover -s ibm
 
 lint: system
 	$(CARGO) fmt --check
@@ -57,7 +68,16 @@ doc: system
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --locked --no-deps
 
 bench: system
-	$(CARGO) bench --locked
+	$(CARGO) bench --locked --bench qaoa
+
+# Transfers on a 57,600 baud line and on one that loses 30 % each way.
+bench-link: system $(VENV)/.ready
+	QUAV_PYTHON=$(CURDIR)/$(VENV)/bin/python $(CARGO) bench --locked --bench link
+
+# The circuit and the line of qubits on IBM's devices, beside qiskit's.
+bench-ibm: system $(VENV_IBM)/.ready
+	QUAV_IBM_PYTHON=$(CURDIR)/$(VENV_IBM)/bin/python \
+		$(CARGO) test --release --locked --test it -- --ignored --nocapture ibm_circuits::figures
 
 # The pictures in fence_examples/README.md.
 examples: build
@@ -70,4 +90,4 @@ examples: build
 
 clean:
 	$(CARGO) clean
-	rm -rf $(VENV) out
+	rm -rf $(VENV) $(VENV_IBM) out

@@ -11,6 +11,7 @@
 //! - [`geodesy`], [`airspace`]: positions, projections, and barriers in the plane;
 //! - [`planner`]: one leg: candidates, QAOA rounds, finish;
 //! - [`qaoa`]: Ising problems and the engines that run the circuit;
+//! - [`ibm`]: the same circuit on a QPU: line of qubits, native gates, OpenQASM;
 //! - [`baseline`]: A* and RRT, to compare with;
 //! - [`stop`]: calling all of that off, and its deadline;
 //! - [`replan`]: a whole mission, and the judgement of any mission;
@@ -23,6 +24,7 @@ pub mod cli;
 pub mod fence;
 pub mod formats;
 pub mod geodesy;
+pub mod ibm;
 pub mod link;
 pub mod mission;
 pub mod planner;

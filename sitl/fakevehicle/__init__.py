@@ -6,6 +6,7 @@ One module per job:
     vehicle         the vehicle itself: state, heartbeat, routing, reboot
     telemetry       the messages it streams or gives out on request
     commands        COMMAND_LONG / COMMAND_INT / SET_MODE
+    ftp             plan files over MAVLink FTP
     parameters      the parameter table and its protocol
     mission_server  what both autopilots share of the mission protocol (server side)
     ardupilot, px4  how each of them really behaves: order, refusals, time-outs

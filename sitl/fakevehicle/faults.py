@@ -92,6 +92,7 @@ KINDS = {
                     "answer item number `item` of an upload with this MAV_MISSION_RESULT and end the upload"),
     "busy": (PLANS, {}, "answer as if somebody else were transferring (ArduPilot DENIED, PX4 ERROR); use until="),
     "half-write": (PLANS, {"item": (_whole, 1)}, "accept the whole upload but store only the first `item` items"),
+    "refuse-ftp": ({}, {"code": (_whole, 1)}, "answer every MAVLink FTP request with this error"),
     "vanish-fence": ({}, {"after": (_seconds, 0.6)}, "erase a fence this long after it was accepted"),
     "lying-count": (PLANS, {"delta": (int, 1), "count": (_whole, None)},
                     "announce a false count for a download: the true one plus delta, or count"),

@@ -24,6 +24,7 @@ class Persona:
     int_params_as_bytes: bool  # PX4 copies the bytes of an INT32 into the float, ArduPilot casts
     flight_version: int       # AUTOPILOT_VERSION.flight_sw_version
     home_is_item_zero: bool
+    serves_files: bool        # plans as files over MAVLink FTP
     parameters: dict = field(default_factory=dict)  # name -> (value, MAV_PARAM_TYPE)
 
 
@@ -47,6 +48,7 @@ ARDUPILOT = Persona(
     int_params_as_bytes=False,
     flight_version=4 << 24 | 7 << 16,
     home_is_item_zero=True,
+    serves_files=True,
     parameters={
         "FENCE_ENABLE": (0, INT8), "FENCE_TYPE": (7, INT8), "FENCE_ACTION": (1, INT8),
         "FENCE_ALT_MAX": (100.0, REAL32), "FENCE_ALT_MIN": (-10.0, REAL32), "FENCE_RADIUS": (300.0, REAL32),
@@ -77,6 +79,7 @@ PX4 = Persona(
     int_params_as_bytes=True,
     flight_version=1 << 24 | 16 << 16 | 255,
     home_is_item_zero=False,
+    serves_files=False,
     parameters={
         "GF_ACTION": (2, INT32), "GF_MAX_HOR_DIST": (0.0, REAL32), "GF_MAX_VER_DIST": (0.0, REAL32),
         "GF_SOURCE": (0, INT32), "GF_PREDICT": (0, INT32), "NAV_ACC_RAD": (10.0, REAL32),

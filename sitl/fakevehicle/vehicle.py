@@ -7,6 +7,7 @@ from .commands import Commands
 from .dialect import FENCE, MISSION, RALLY, TYPE_NAMES, TYPE_NUMBERS, mavlink
 from .faults import ON_VEHICLE, Faults
 from .fence_rules import fence_total
+from .ftp import Ftp
 from .ground_station import GroundStation, invented_plan
 from .mission_server import PlanStore
 from .parameters import Parameters
@@ -39,7 +40,7 @@ class Vehicle:
         self.parameters = Parameters(self)
         if "SYSID_THISMAV" in self.parameters.table:
             self.parameters.set("SYSID_THISMAV", sysid)
-        self.telemetry, self.commands = Telemetry(self), Commands(self)
+        self.telemetry, self.commands, self.ftp = Telemetry(self), Commands(self), Ftp(self)
         self.channels = []
         self.servers = {}  # ArduPilot: one for all, PX4: one per link
         self.px4_shared = Px4Shared()
@@ -186,7 +187,7 @@ class Vehicle:
         self._forward(channel, msg, system, component)
         if system not in (0, self.sysid) or component not in (0, mavlink.MAV_COMP_ID_AUTOPILOT1, 190):
             return
-        for protocol in (self.mission_server(channel.link), self.commands, self.parameters, self.telemetry):
+        for protocol in (self.mission_server(channel.link), self.commands, self.parameters, self.ftp, self.telemetry):
             if protocol.handle(channel, msg):
                 return
 
@@ -208,6 +209,7 @@ class Vehicle:
         self.down = True
         for server in self.servers.values():
             server.reset()
+        self.ftp.reset()
         for channel in self.channels:
             self.telemetry.stop(channel)
             channel.heard.clear()

@@ -22,6 +22,7 @@ use crate::replan::{self, Input, Options, Replanned, replan};
 use crate::report::picture::picture;
 use crate::stop::Stop;
 use crate::store::Store;
+use crate::vehicle::download::Downloaded;
 use crate::vehicle::numbering::{to_mission, to_vehicle};
 use crate::vehicle::readback::differences;
 use crate::vehicle::replace::{Replacement, WhileArmed, pilots_own, replace, restore, settle};
@@ -220,9 +221,12 @@ async fn read(
     shown: &Shown,
 ) -> Result<Read, CliError> {
     let mut on_progress = |progress| shown.transfer(progress);
-    let held = vehicle.download(MissionType::Mission, &mut on_progress).await?.items;
-    let fence = vehicle.download(MissionType::Fence, &mut on_progress).await?.items;
-    let rally = vehicle.download(MissionType::Rally, &mut on_progress).await?.items;
+    let mission = vehicle.read_plan(MissionType::Mission, &mut on_progress).await?;
+    let fence = vehicle.read_plan(MissionType::Fence, &mut on_progress).await?;
+    let rally = vehicle.read_plan(MissionType::Rally, &mut on_progress).await?;
+    let fell_back: Vec<String> =
+        [&mission, &fence, &rally].into_iter().filter_map(Downloaded::fell_back).collect();
+    let (held, fence, rally) = (mission.items, fence.items, rally.items);
     shown.doing("waiting for the vehicle's home and position");
     let known =
         |state: &crate::vehicle::VehicleState| state.home.is_some() && state.position.is_some();
@@ -232,7 +236,8 @@ async fn read(
     let original = pilots_own(vehicle, store, MissionType::Mission, &held).await?;
     let mission = to_mission(vehicle.autopilot(), &original, state.home);
     let decoded = decode_fence(&fence, None)?;
-    let (mut fences, mut warnings) = (decoded.fences, decoded.warnings);
+    let (mut fences, mut warnings) = (decoded.fences, fell_back);
+    warnings.extend(decoded.warnings);
     if args.planning.safety.ignore_disabled_fence {
         warnings.extend(rules.leave_out_disabled(&mut fences));
     }

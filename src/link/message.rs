@@ -14,6 +14,7 @@ use mavlink::{MavlinkVersion, MessageData};
 use super::id::{ComponentId, Node, SystemId};
 use crate::mission::{Command, Frame, MissionItem};
 
+pub use file_transfer::FileTransfer;
 pub use parameter::{ParamError, ParamName, ParamRequestRead, ParamValue};
 
 /// Reads little-endian fields from a payload; what the sender truncated reads as zero.
@@ -79,6 +80,7 @@ macro_rules! message {
     };
 }
 
+mod file_transfer;
 mod parameter;
 
 /// Joins byte arrays into one of a known length.
@@ -345,15 +347,26 @@ pub struct MissionCurrent {
     pub state: u8,
     /// 1 in mission mode, 2 suspended; 0 unknown.
     pub mode: u8,
+    /// The vehicle's fingerprints of its mission, fence and rally points; 0 where it has none.
+    pub plan_ids: [u32; 3],
 }
 
 impl MissionCurrent {
     fn encode(&self) -> [u8; 18] {
-        joined(&[&self.seq.to_le_bytes(), &self.total.to_le_bytes(), &[self.state, self.mode]])
+        let [mission, fence, rally] = self.plan_ids.map(u32::to_le_bytes);
+        let state = [self.state, self.mode];
+        let (seq, total) = (self.seq.to_le_bytes(), self.total.to_le_bytes());
+        joined(&[&seq, &total, &state, &mission, &fence, &rally])
     }
 
     fn decode(fields: &Fields<'_>) -> Self {
-        Self { seq: fields.u16(0), total: fields.u16(2), state: fields.u8(4), mode: fields.u8(5) }
+        Self {
+            seq: fields.u16(0),
+            total: fields.u16(2),
+            state: fields.u8(4),
+            mode: fields.u8(5),
+            plan_ids: [fields.u32(6), fields.u32(10), fields.u32(14)],
+        }
     }
 }
 message!(MissionCurrent, "MISSION_CURRENT", id 42, crc 28, length 18);

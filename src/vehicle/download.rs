@@ -26,6 +26,36 @@ pub struct Downloaded {
     pub items: Vec<MissionItem>,
     /// The vehicle's fingerprint of the plan; 0 where it has none (ArduPilot).
     pub opaque_id: u32,
+    /// How it came.
+    pub source: Source,
+}
+
+impl Downloaded {
+    /// What to tell the user where the vehicle offers files and a file could not be had.
+    #[must_use]
+    pub fn fell_back(&self) -> Option<String> {
+        match &self.source {
+            Source::MissionProtocol { ftp_failed: Some(reason) } => {
+                Some(format!("read item by item, since MAVLink FTP failed for the {reason}"))
+            }
+            _ => None,
+        }
+    }
+}
+
+/// The way a plan came.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Source {
+    /// Item by item.
+    MissionProtocol {
+        /// Why not as a file, where the vehicle offers files.
+        ftp_failed: Option<String>,
+    },
+    /// As a file over MAVLink FTP, held against the vehicle's own checksum.
+    File {
+        /// That checksum.
+        crc32: u32,
+    },
 }
 
 impl Vehicle {
@@ -42,7 +72,8 @@ impl Vehicle {
         let mut restarts = 0;
         loop {
             let mut exchange = Exchange::new(self, mission_type)?;
-            match attempt(&mut exchange, on_progress).await {
+            let widest = if restarts == 0 { widest_window(self.autopilot) } else { 1 };
+            match attempt(&mut exchange, widest, on_progress).await {
                 Ok(plan) => {
                     tracing::debug!(plan = %mission_type, items = plan.items.len(), "downloaded");
                     return Ok(plan);
@@ -61,6 +92,7 @@ impl Vehicle {
 
 async fn attempt(
     exchange: &mut Exchange<'_>,
+    widest: usize,
     on_progress: OnProgress<'_>,
 ) -> Result<Downloaded, Setback> {
     let (count, opaque_id) = count(exchange).await?;
@@ -68,7 +100,7 @@ async fn attempt(
     let total = usize::from(count);
     let mut tell = |done| on_progress(Progress { direction, mission_type, done, total });
     tell(0);
-    let items = items(exchange, count, &mut tell).await?;
+    let items = items(exchange, count, widest, &mut tell).await?;
     // Without this the vehicle would keep the transfer open until its own time-out.
     let ack = MissionAck {
         target: exchange.target(),
@@ -77,7 +109,8 @@ async fn attempt(
         opaque_id: 0,
     };
     exchange.send(&ack).await?;
-    Ok(Downloaded { items, opaque_id })
+    let source = Source::MissionProtocol { ftp_failed: None };
+    Ok(Downloaded { items, opaque_id, source })
 }
 
 /// MISSION_REQUEST_LIST until there is a MISSION_COUNT.
@@ -138,39 +171,98 @@ fn is_refusal(result: MissionResult) -> bool {
     )
 }
 
+/// Answers to later requests after which a request counts as lost: fewer could be a line that
+/// changes the order (TCP's rule, RFC 5681, section 3.2).
+const OVERTAKEN: u32 = 3;
+
 /// One request under way.
 struct Asked {
     at: Instant,
+    /// Its place among all requests of the transfer.
+    turn: u64,
     again: bool,
+    /// How many requests that were made later have been answered.
+    overtaken: u32,
 }
 
-/// MISSION_REQUEST_INT for each item, until all are there.
-///
-/// PX4 keeps a cursor and ends the transfer over a request out of turn, so the window is one
-/// unless the autopilot is known to answer in any order; it grows while nothing is lost.
+/// Requests under way, by item.
+#[derive(Default)]
+struct UnderWay {
+    requests: BTreeMap<u16, Asked>,
+    turns: u64,
+}
+
+impl UnderWay {
+    async fn ask(
+        &mut self,
+        exchange: &Exchange<'_>,
+        seq: u16,
+        again: bool,
+    ) -> Result<(), TransferError> {
+        let (target, mission_type) = (exchange.target(), exchange.wire_type());
+        exchange.send(&MissionRequestInt { seq, target, mission_type }).await?;
+        self.turns += 1;
+        let asked = Asked { at: Instant::now(), turn: self.turns, again, overtaken: 0 };
+        self.requests.insert(seq, asked);
+        Ok(())
+    }
+
+    /// When the oldest request was made.
+    fn oldest(&self) -> Instant {
+        self.requests.values().map(|asked| asked.at).min().unwrap_or_else(Instant::now)
+    }
+
+    /// Those that have waited long enough.
+    fn overdue(&self, wait: Duration) -> Vec<u16> {
+        let overdue = |(&seq, asked): (&u16, &Asked)| (asked.at.elapsed() >= wait).then_some(seq);
+        self.requests.iter().filter_map(overdue).collect()
+    }
+
+    /// Those that are lost now that a later one was answered. The autopilot answers in the order of
+    /// the requests: no need to wait for the end of their time.
+    fn overtaken_by(&mut self, answered: &Asked) -> Vec<u16> {
+        let mut lost = Vec::new();
+        for (&seq, earlier) in &mut self.requests {
+            if earlier.turn < answered.turn {
+                earlier.overtaken += 1;
+                if earlier.overtaken >= OVERTAKEN {
+                    lost.push(seq);
+                }
+            }
+        }
+        lost
+    }
+}
+
+/// PX4 keeps a cursor and ends the transfer over a request out of turn, so one request is under way
+/// at a time unless the autopilot is known to answer in any order.
+fn widest_window(autopilot: Autopilot) -> usize {
+    if autopilot == Autopilot::ArduPilot { WIDEST_WINDOW } else { 1 }
+}
+
+/// MISSION_REQUEST_INT for each item, until all are there. The window grows up to `widest` with each
+/// answer and is halved when the line falls quiet; a transfer that is begun again has one of one.
 async fn items(
     exchange: &mut Exchange<'_>,
     count: u16,
+    widest: usize,
     tell: &mut (dyn FnMut(usize) + Send),
 ) -> Result<Vec<MissionItem>, Setback> {
-    let widest = if exchange.vehicle.autopilot == Autopilot::ArduPilot { WIDEST_WINDOW } else { 1 };
     let mut window = 1;
     let mut held: BTreeMap<u16, MissionItem> = BTreeMap::new();
-    let mut asked: BTreeMap<u16, Asked> = BTreeMap::new();
+    let mut under_way = UnderWay::default();
     let mut next = 0;
     let mut patience = Patience::new();
     while held.len() < usize::from(count) {
-        while asked.len() < window && next < count {
-            request(exchange, next).await?;
-            asked.insert(next, Asked { at: Instant::now(), again: false });
+        while under_way.requests.len() < window && next < count {
+            under_way.ask(exchange, next, false).await?;
             next += 1;
         }
         let wait = exchange.round_trip.item_wait(exchange.timing());
-        let oldest = asked.values().map(|asked| asked.at).min().unwrap_or_else(Instant::now);
-        match exchange.next_before(oldest + wait).await? {
+        match exchange.next_before(under_way.oldest() + wait).await? {
             Some(Heard::Item(item)) => {
                 // Another seq than one that is wanted: a repeat, or somebody's mistake.
-                let Some(request) = asked.remove(&item.seq) else { continue };
+                let Some(request) = under_way.requests.remove(&item.seq) else { continue };
                 if !request.again {
                     exchange.round_trip.measured(request.at.elapsed());
                     window = (window + 1).min(widest);
@@ -178,6 +270,9 @@ async fn items(
                 held.insert(item.seq, item);
                 patience.renew();
                 tell(held.len());
+                for seq in under_way.overtaken_by(&request) {
+                    under_way.ask(exchange, seq, true).await?;
+                }
             }
             // PX4 lost the thread, or the plan is shorter than was announced.
             Some(Heard::Ack { result, .. })
@@ -190,33 +285,16 @@ async fn items(
             Some(_) => {}
             None => {
                 window = (window / 2).max(1);
-                let waiting = asked.keys().next().copied().unwrap_or(next);
+                let waiting = under_way.requests.keys().next().copied().unwrap_or(next);
                 if exchange.is_hopeless(&mut patience) {
                     let error = exchange.no_answer(Awaited::Item(waiting), patience.waited());
                     return Err(Setback::Again(error));
                 }
-                ask_overdue(exchange, &mut asked, wait).await?;
+                for seq in under_way.overdue(wait) {
+                    under_way.ask(exchange, seq, true).await?;
+                }
             }
         }
     }
     Ok(held.into_values().collect())
-}
-
-async fn ask_overdue(
-    exchange: &Exchange<'_>,
-    asked: &mut BTreeMap<u16, Asked>,
-    wait: Duration,
-) -> Result<(), TransferError> {
-    for (&seq, request_made) in asked.iter_mut() {
-        if request_made.at.elapsed() >= wait {
-            request(exchange, seq).await?;
-            *request_made = Asked { at: Instant::now(), again: true };
-        }
-    }
-    Ok(())
-}
-
-async fn request(exchange: &Exchange<'_>, seq: u16) -> Result<(), TransferError> {
-    let (target, mission_type) = (exchange.target(), exchange.wire_type());
-    exchange.send(&MissionRequestInt { seq, target, mission_type }).await
 }

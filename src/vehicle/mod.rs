@@ -2,13 +2,14 @@
 //! fences and rally points without ever losing one.
 //!
 //! [`discovery`] finds it, [`state`] follows it, [`parameter`] reads its parameters, [`download`],
-//! [`upload`] and [`clear`] speak the mission protocol over [`transfer`], [`readback`] compares what was sent with what is held,
+//! [`upload`] and [`clear`] speak the mission protocol over [`transfer`], [`ftp`] reads plans as files, [`readback`] compares what was sent with what is held,
 //! [`replace`] is the safe sequence of it all, [`numbering`] turns the vehicle's lists into
 //! missions and back.
 
 pub mod clear;
 pub mod discovery;
 pub mod download;
+pub mod ftp;
 pub mod numbering;
 pub mod parameter;
 pub mod readback;
@@ -27,6 +28,7 @@ use tokio::task::JoinHandle;
 use tokio::time::timeout;
 
 pub use discovery::{Autopilot, Capabilities, DiscoveryError, Search, find};
+pub use ftp::plan::Fingerprint;
 pub use parameter::{ParameterError, ParameterValue};
 pub use state::{Position, VehicleState};
 pub use timing::Timing;

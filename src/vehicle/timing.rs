@@ -19,6 +19,8 @@ pub struct Timing {
     pub round_trips: u32,
     /// For the answers to a round of questions for parameters.
     pub parameter: Duration,
+    /// For the answer to a question of MAVLink FTP, at the least: a checksum wants a plan scanned.
+    pub ftp: Duration,
     /// How often a message is repeated before it can count as unanswered.
     pub retries: u32,
     /// A transfer that has not come forward for this long is given up, after the retries. Longer
@@ -51,6 +53,7 @@ impl Default for Timing {
             item_max: Duration::from_millis(1500),
             round_trips: 4,
             parameter: Duration::from_millis(400),
+            ftp: Duration::from_millis(500),
             retries: 5,
             patience: Duration::from_secs(10),
             restarts: 3,
@@ -68,10 +71,15 @@ impl Default for Timing {
 impl Timing {
     /// A pause before asking a busy vehicle again, not the same for two clients that collided.
     pub(super) fn busy_pause(&self) -> Duration {
-        // A hasher's random keys are random enough to keep two clients apart.
-        let fraction = RandomState::new().hash_one(0_u8) as f64 / u64::MAX as f64;
+        let fraction = f64::from(random_u16()) / f64::from(u16::MAX);
         self.busy_pause.mul_f64(1.0 + fraction)
     }
+}
+
+/// Not the same for two clients.
+pub(super) fn random_u16() -> u16 {
+    // A hasher's random keys are random enough to keep two clients apart.
+    (RandomState::new().hash_one(0_u8) >> 48) as u16
 }
 
 /// The wait for an item, from the round trips seen so far.

@@ -192,6 +192,26 @@ async fn after_the_first_heartbeat_other_addresses_are_not_heard() {
     session.close().await;
 }
 
+#[tokio::test]
+async fn a_vehicle_that_comes_back_under_another_address_is_found_there() {
+    let port = free_port();
+    let listen: Endpoint = format!("udpin:127.0.0.1:{port}").parse().unwrap();
+    let transport = Transport::open(&listen).await.unwrap();
+    let to = format!("udpout:127.0.0.1:{port}");
+    let fake = FakeVehicle::start_on(&to, &[]);
+    let session = Session::over(transport, &search()).await.unwrap();
+    drop(fake);
+    let begun = tokio::time::Instant::now();
+    // Its socket, and with it its port, is another one.
+    let mut fake = FakeVehicle::start_on(&to, &[]);
+    fake.set(MISSION, &(0..5).map(waypoint).collect::<Vec<_>>());
+    let back = session.vehicle.wait_for(Duration::from_secs(30), |s| s.heartbeat_at > begun).await;
+    assert!(back.is_some());
+    let held = session.vehicle.download(MISSION, &mut |_| {}).await.unwrap().items;
+    assert_eq!(held.len(), fake.held(MISSION).len());
+    session.close().await;
+}
+
 fn free_port() -> u16 {
     UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }
@@ -237,5 +257,44 @@ fn megabytes_of_garbage_stop_no_download_and_cost_no_memory() {
         println!("{link}: {} kB of garbage, peak {quiet} -> {flooded} kB", applied * bytes / 1000);
         assert!(applied * bytes > 3_000_000, "{link}: {applied} times");
         assert!(flooded < quiet + 6_000, "{link}: {quiet} kB quiet, {flooded} kB flooded");
+    }
+}
+
+#[test]
+fn the_program_takes_a_key_from_a_private_file_or_a_credential_and_from_nowhere_else() {
+    use std::os::unix::fs::PermissionsExt;
+    let (secret, other) = (Secret::new(0x31), Secret::new(0x32));
+    let mut fake = FakeVehicle::start(&["--signing-key", &secret.path()]);
+    fake.set(MISSION, &(0..3).map(waypoint).collect::<Vec<_>>());
+    let url = fake.endpoint().to_string();
+    let state = tempfile::tempdir().unwrap();
+    let once = |key: &[&str], wait: &str| {
+        Command::new(env!("CARGO_BIN_EXE_quavd"))
+            .args(["once", "--dry-run", "--connect", &url, "--system", "1", "--wait", wait])
+            .args(["--state-dir", state.path().to_str().unwrap()])
+            .args(key)
+            .env("CREDENTIALS_DIRECTORY", secret.directory.path())
+            .output()
+            .unwrap()
+    };
+    for key in [secret.path().as_str(), "credential:key"] {
+        let output = once(&["--signing-key", key], "15");
+        let says = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(0), "{key}: {says}");
+        assert!(!says.contains(&"31".repeat(8)), "the key is shown: {says}");
+    }
+    let open = secret.directory.path().join("open");
+    std::fs::write(&open, [7; 32]).unwrap();
+    std::fs::set_permissions(&open, std::fs::Permissions::from_mode(0o644)).unwrap();
+    for (key, code, reason) in [
+        (other.path().as_str(), 4, "signed with another key"),
+        (open.to_str().unwrap(), 2, "chmod 600"),
+        ("credential:none", 2, "cannot read the signing key"),
+        ("/dev/null", 2, "is no regular file"),
+    ] {
+        let output = once(&["--signing-key", key], "3");
+        let says = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(code), "{key}: {says}");
+        assert!(says.contains(reason), "{key}: {says}");
     }
 }

@@ -1,7 +1,7 @@
 //! Plans go to the vehicle and come back as they are, over every kind of link and for both
 //! autopilots.
 
-use quav::mission::{Mission, MissionItem, MissionType};
+use quav::mission::{Command, Frame, Mission, MissionItem, MissionType};
 use quav::vehicle::numbering::{to_mission, to_vehicle};
 use quav::vehicle::readback::differences;
 use quav::vehicle::upload::Uploaded;
@@ -69,6 +69,44 @@ async fn a_fence_goes_there_and_back_and_an_empty_list_clears_it() {
         vehicle.upload(MissionType::Fence, &[], &mut |_| {}).await.unwrap();
         assert!(vehicle.download(MissionType::Fence, &mut |_| {}).await.unwrap().items.is_empty());
         assert!(fake.held(MissionType::Fence).is_empty());
+        session.close().await;
+    }
+}
+
+/// One plan of each kind, in the vehicle's numbering.
+fn plan_of(mission_type: MissionType) -> Vec<MissionItem> {
+    match mission_type {
+        MissionType::Mission => (0..8).map(waypoint).collect(),
+        MissionType::Fence => triangle(),
+        MissionType::Rally => vec![MissionItem {
+            command: Command::NAV_RALLY_POINT,
+            frame: Frame::GLOBAL_RELATIVE_ALT_INT,
+            ..waypoint(0)
+        }],
+    }
+}
+
+#[tokio::test]
+async fn each_kind_of_plan_goes_up_down_and_away_and_leaves_the_others_alone() {
+    const PLANS: [MissionType; 3] = [MissionType::Mission, MissionType::Fence, MissionType::Rally];
+    for persona in PERSONAS {
+        let mut fake = FakeVehicle::start(&["--persona", persona]);
+        let session = Session::open(&fake.endpoint(), search()).await;
+        let vehicle = &session.vehicle;
+        for plan in PLANS {
+            let sent = plan_of(plan);
+            let uploaded = vehicle.upload(plan, &sent, &mut |_| {}).await.unwrap();
+            assert_eq!(uploaded, Uploaded::Acknowledged, "{persona} {plan}");
+            let held = vehicle.download(plan, &mut |_| {}).await.unwrap().items;
+            assert_eq!(differences(vehicle.autopilot(), plan, &sent, &held), []);
+        }
+        for (k, plan) in PLANS.into_iter().enumerate() {
+            vehicle.clear(plan).await.unwrap();
+            assert!(vehicle.download(plan, &mut |_| {}).await.unwrap().items.is_empty());
+            for (other, there) in PLANS.into_iter().zip(0..) {
+                assert_eq!(fake.held(other).is_empty(), there <= k, "{persona} {plan} {other}");
+            }
+        }
         session.close().await;
     }
 }

@@ -86,9 +86,11 @@ fn the_other_messages_have_the_layout_of_the_dialect() {
     agrees::<_, dialect::COMMAND_ACK_DATA>(ack);
     let text = StatusText { severity: 4, text: [b'x'; 50], id: 5, chunk: 2 };
     agrees::<_, dialect::STATUSTEXT_DATA>(text);
-    let current = MissionCurrent { seq: 4, total: 9, state: 3, mode: 1 };
+    let plan_ids = [7, 8, 1 << 31];
+    let current = MissionCurrent { seq: 4, total: 9, state: 3, mode: 1, plan_ids };
     let theirs: dialect::MISSION_CURRENT_DATA = agrees(current);
     assert_eq!((theirs.seq, theirs.total), (4, 9));
+    assert_eq!([theirs.mission_id, theirs.fence_id, theirs.rally_points_id], plan_ids);
 }
 
 #[test]
@@ -135,4 +137,26 @@ fn a_parameter_name_is_1_to_16_characters_and_ends_at_a_zero() {
     let padded = ParamName::decode(&Fields(b"GF_ACTION\0rubbish"), 0);
     assert_eq!(padded, ParamName::new("GF_ACTION").unwrap());
     assert_eq!(padded.to_string(), "GF_ACTION");
+}
+
+#[test]
+fn a_file_transfer_has_the_layout_of_the_guide() {
+    let mut data = [0; FileTransfer::MOST_DATA];
+    data[238] = 9;
+    let ours = FileTransfer {
+        target: TARGET,
+        seq: 0x0201,
+        session: 3,
+        opcode: 4,
+        size: 239,
+        req_opcode: 6,
+        offset: 0x0d0c_0b0a,
+        data,
+    };
+    let theirs: dialect::FILE_TRANSFER_PROTOCOL_DATA = agrees(ours);
+    assert_eq!((theirs.target_system, theirs.target_component), (7, 195));
+    let head = [1, 2, 3, 4, 239, 6, 0, 0, 10, 11, 12, 13, 0];
+    assert_eq!(theirs.payload[..13], head);
+    assert_eq!(theirs.payload[250], 9);
+    assert_eq!(FileTransfer { size: 255, ..ours }.bytes().len(), 239, "a lie about the size");
 }

@@ -1,3 +1,5 @@
+use tokio::time::Instant;
+
 use super::*;
 use crate::link::message::{MissionCount, MissionRequestInt, MissionRequestList, StatusText};
 
@@ -212,4 +214,30 @@ async fn a_refusal_carries_the_words_that_come_after_it() {
     });
     let error = held.unwrap_err().to_string();
     assert!(error.contains("unsupported command") && error.contains("no such one"), "{error}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_item_that_later_ones_overtook_is_asked_for_at_once() {
+    let (vehicle, mut peer, _task) = scene(ARDUPILOT).await;
+    let (held, begun) = tokio::join!(download(&vehicle), async {
+        peer.hears::<MissionRequestList>().await;
+        peer.say(&count(80)).await;
+        let begun = Instant::now();
+        // The request for item 20 is lost twice; enough others follow each time.
+        let (mut lost, mut missing) = (0, 80);
+        while missing > 0 {
+            let request: MissionRequestInt = peer.hears().await;
+            tokio::time::advance(Duration::from_millis(1)).await;
+            if request.seq == 20 && lost < 2 {
+                lost += 1;
+                continue;
+            }
+            peer.say(&item_message(item(request.seq))).await;
+            missing -= 1;
+        }
+        begun
+    });
+    assert_eq!(held.unwrap(), items(80));
+    let waited = begun.elapsed();
+    assert!(waited < vehicle.timing.item_min, "waited for a time-out: {waited:?}");
 }
