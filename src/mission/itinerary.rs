@@ -44,6 +44,8 @@ struct Itinerary<'a> {
     /// A `DO_SET_HOME` at a place that is not known was passed.
     home_lost: bool,
     landings: Vec<usize>,
+    /// Items whose places the mission can begin at.
+    first_places: Vec<usize>,
     steps: usize,
     legs: Vec<Leg>,
 }
@@ -69,6 +71,7 @@ pub(super) fn follow(
         known_homes: home.into_iter().map(bits).collect(),
         home_lost: false,
         landings: landings.collect(),
+        first_places: Vec::new(),
         steps: 0,
         legs: Vec::new(),
     };
@@ -79,6 +82,7 @@ pub(super) fn follow(
     itinerary.walk_all(start)?;
     itinerary.stay_at_places_without_legs();
     bend_splines(items, &mut itinerary.legs);
+    itinerary.mark_what_is_behind_jumps();
     warnings.extend(items.iter().enumerate().filter_map(warning));
     warnings.sort_by_key(|warning| warning.item());
     Ok(MissionLegs { legs: itinerary.legs, warnings })
@@ -265,6 +269,9 @@ impl Itinerary<'_> {
         let circle = self.radii[index];
         let to = |position, altitude| LegEnd { item: Some(index), position, altitude, circle };
         if let Some(place) = self.places[index] {
+            if state.status == Status::Before && state.jump.is_none() {
+                self.first_places.push(index);
+            }
             if state.status == Status::Flying {
                 let from = self.leave(&state)?;
                 let to = to(place, self.altitude(index, destination));
@@ -388,7 +395,16 @@ impl Itinerary<'_> {
             (LegKind::Flown, Some(l)) => LegKind::Return(ReturnTo::LandingSequence(l.entry)),
             _ => kind,
         };
-        self.legs.push(Leg { from, to, kind, shape, jump: state.jump, insert_before, by_jump });
+        self.legs.push(Leg {
+            from,
+            to,
+            kind,
+            shape,
+            jump: state.jump,
+            insert_before,
+            by_jump,
+            behind_jump: false,
+        });
         Ok(())
     }
 
@@ -421,7 +437,34 @@ impl Itinerary<'_> {
                 jump: None,
                 insert_before: None,
                 by_jump: None,
+                behind_jump: false,
             });
+        }
+    }
+
+    /// Marks the legs that the way without jumps does not come to.
+    fn mark_what_is_behind_jumps(&mut self) {
+        let into: HashSet<usize> = self.legs.iter().filter_map(|leg| leg.to.item).collect();
+        let mut onward: HashMap<usize, Vec<usize>> = HashMap::new();
+        let mut open = self.first_places.clone();
+        for leg in self.legs.iter().filter(|leg| leg.jump.is_none()) {
+            match (leg.from.item, leg.to.item) {
+                // Where no leg leads to, a takeoff, a hold or nothing at all does.
+                (Some(from), to) => {
+                    onward.entry(from).or_default().extend(to);
+                    open.extend((!into.contains(&from)).then_some(from));
+                }
+                (None, to) => open.extend(to),
+            }
+        }
+        let mut reached = HashSet::new();
+        while let Some(item) = open.pop() {
+            if reached.insert(item) {
+                open.extend(onward.get(&item).into_iter().flatten());
+            }
+        }
+        for leg in &mut self.legs {
+            leg.behind_jump = leg.from.item.is_some_and(|from| !reached.contains(&from));
         }
     }
 

@@ -111,6 +111,8 @@ pub struct Leg {
     pub insert_before: Option<usize>,
     /// How waypoints can be put into a leg that is flown by a jump.
     pub by_jump: Option<JumpInsertion>,
+    /// Whether only a jump leads to where it starts.
+    pub behind_jump: bool,
 }
 
 /// Waypoints for a leg that is flown by a jump stand before the jump's target. The jump goes to the

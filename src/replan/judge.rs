@@ -98,9 +98,10 @@ impl Verdict {
     }
 }
 
-/// Whether a leg is part of the plain way: no jump, no return to anywhere but home.
+/// Whether a leg is part of the plain way: no jump by it or to it, no return to anywhere but home.
 pub(super) fn is_on_the_way(leg: &Leg) -> bool {
     leg.jump.is_none()
+        && !leg.behind_jump
         && matches!(leg.kind, LegKind::Flown | LegKind::Takeoff | LegKind::Return(ReturnTo::Home))
 }
 
