@@ -5,15 +5,18 @@ PYTHON ?= python3
 VENV := .venv
 VENV_IBM := .venv-ibm
 BIN := $(or $(CARGO_TARGET_DIR),target)/release/quavd
-PACKAGES := cmake g++ make pkg-config sqlite3 libsqlite3-dev python3-venv
+PACKAGES := cmake g++ make pkg-config sqlite3 libsqlite3-dev python3-venv systemd
 
-.PHONY: all build demo test test-rust test-python test-ibm lint doc bench bench-link bench-ibm examples clean system
+TOOLS := target/tools
+
+.PHONY: all build demo ibm-demo deb test-deb soak daemon-figures test test-rust test-python test-ibm lint doc \
+	bench bench-table bench-peers bench-link bench-ibm fuzz examples gallery reference clean system
 
 all: build
 
 # PROJ is built from source and wants cmake and sqlite3; the tests want a venv.
 system:
-	@for tool in cmake g++ pkg-config sqlite3; do command -v $$tool >/dev/null || missing=1; done; \
+	@for tool in cmake g++ pkg-config sqlite3 systemd-analyze; do command -v $$tool >/dev/null || missing=1; done; \
 	test -e /usr/include/sqlite3.h || missing=1; \
 	if [ -n "$$missing" ]; then \
 		sudo=; [ "$$(id -u)" = 0 ] || sudo=sudo; \
@@ -21,12 +24,13 @@ system:
 		DEBIAN_FRONTEND=noninteractive $$sudo apt-get install -y -qq --no-install-recommends $(PACKAGES); \
 	fi
 
-$(VENV)/.ready: sitl/requirements.txt
+$(VENV)/.ready: sitl/requirements.txt sitl/requirements-alone.txt
 	$(PYTHON) -c 'import ensurepip' 2>/dev/null || { \
 		sudo=; [ "$$(id -u)" = 0 ] || sudo=sudo; \
 		$$sudo apt-get update -qq && $$sudo apt-get install -y -qq python3-venv; }
 	$(PYTHON) -m venv $(VENV)
 	$(VENV)/bin/pip install --quiet --disable-pip-version-check -r sitl/requirements.txt
+	$(VENV)/bin/pip install --quiet --disable-pip-version-check --no-deps -r sitl/requirements-alone.txt
 	touch $@
 
 # qiskit, for the tests of the circuits and for the stand-in of IBM's service.
@@ -41,6 +45,28 @@ build: system
 # The main job: a fake vehicle with a mission through no-fly areas, re-planned, uploaded, verified.
 demo: build $(VENV)/.ready
 	$(VENV)/bin/python sitl/demo.py --quavd $(BIN) --scenario fence_examples/s1.plan --out out
+
+# A Debian package: program, unit, example configuration, man pages, completions.
+deb: build $(TOOLS)/bin/cargo-deb
+	rm -rf target/package
+	$(BIN) generate target/package
+	$(TOOLS)/bin/cargo-deb --no-build --no-strip --output target/debian/
+
+$(TOOLS)/bin/cargo-deb:
+	$(CARGO) install cargo-deb --locked --root $(TOOLS)
+
+# Installs, runs and purges it on this machine, which has to be one that can be thrown away.
+test-deb: deb
+	systemd/test-deb target/debian/quavd_*.deb
+
+# The daemon for an hour with everything that can happen to it; SOAK=MINUTES for another time.
+SOAK ?= 60
+soak: build $(VENV)/.ready
+	$(VENV)/bin/python sitl/soak.py --quavd $(BIN) --minutes $(SOAK)
+
+# Idle cost, and the time from a change on the vehicle to the verified upload.
+daemon-figures: build $(VENV)/.ready
+	$(VENV)/bin/python sitl/figures.py --quavd $(BIN)
 
 test: test-rust test-python test-ibm
 
@@ -57,8 +83,12 @@ test-python: $(VENV)/.ready
 	cd sitl && MAVLINK20=1 ../$(VENV)/bin/python -m unittest
 
 # What needs qiskit is in a folder of its own, which the unittest above does not look into.
-test-ibm: $(VENV_IBM)/.ready
-	cd sitl && ../$(VENV_IBM)/bin/python -m unittest discover -s ibm
+test-ibm: build $(VENV_IBM)/.ready
+	cd sitl && QUAVD=$(abspath $(BIN)) ../$(VENV_IBM)/bin/python -m unittest discover -s ibm
+
+# The six scenarios on a stand-in of ibm_kyiv with its recorded errors, and a training on it. Some minutes.
+ibm-demo: build $(VENV_IBM)/.ready
+	$(VENV_IBM)/bin/python sitl/ibm_demo.py --quavd $(BIN) --out out
 
 lint: system
 	$(CARGO) fmt --check
@@ -67,8 +97,26 @@ lint: system
 doc: system
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --locked --no-deps
 
+# Fuzzing: RUNS executions of each target from the corpora in tests/fuzz.
+RUNS ?= 100000
+fuzz: system
+	tests/fuzz/run $(RUNS)
+
 bench: system
 	$(CARGO) bench --locked --bench qaoa
+
+# Times and peak memory of engines and whole plans, one row each.
+bench-table: system
+	$(CARGO) bench --locked --bench table
+
+# quavd's engines beside PennyLane's, which takes minutes; STEPS=3 shortens its training.
+bench-peers: system $(VENV)-peers/.ready
+	QUAVD_PEERS_PYTHON=$(CURDIR)/$(VENV)-peers/bin/python $(CARGO) bench --locked --bench peers
+
+$(VENV)-peers/.ready: benches/requirements.txt
+	$(PYTHON) -m venv $(VENV)-peers
+	$(VENV)-peers/bin/pip install --quiet --disable-pip-version-check -r benches/requirements.txt
+	touch $@
 
 # Transfers on a 57,600 baud line and on one that loses 30 % each way.
 bench-link: system $(VENV)/.ready
@@ -88,6 +136,14 @@ examples: build
 		code=$$?; [ $$code = 0 ] || [ $$code = 3 ] || exit $$code; \
 	done
 
+# docs/configuration.md from the declarations in src/config.
+reference: system
+	QUAV_WRITE_REFERENCE=1 $(CARGO) test --release --locked --test it -- the_configuration_reference
+
+# A page of all examples with their reports: out/gallery/index.html.
+gallery: build
+	docs/gallery.sh $(BIN) out/gallery
+
 clean:
 	$(CARGO) clean
-	rm -rf $(VENV) $(VENV_IBM) out
+	rm -rf $(VENV) $(VENV)-peers $(VENV_IBM) out

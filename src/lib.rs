@@ -16,11 +16,15 @@
 //! - [`stop`]: calling all of that off, and its deadline;
 //! - [`replan`]: a whole mission, and the judgement of any mission;
 //! - [`report`]: what is said and shown about it: JSON, a summary, a picture;
+//! - [`config`]: the configuration file `quavd.toml`;
+//! - [`daemon`]: staying with a vehicle, and planning when its plans change;
 //! - [`cli`]: the commands of `quavd`.
 
 pub mod airspace;
 pub mod baseline;
 pub mod cli;
+pub mod config;
+pub mod daemon;
 pub mod fence;
 pub mod formats;
 pub mod geodesy;

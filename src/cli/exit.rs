@@ -5,8 +5,10 @@ use std::process::ExitCode;
 
 use crate::cli::files::FileError;
 use crate::cli::qaoa::QaoaCommandError;
+use crate::config::ConfigError;
 use crate::fence::items::FenceItemError;
 use crate::formats::FormatError;
+use crate::ibm::error::IbmError;
 use crate::link::LinkError;
 use crate::replan::ReplanError;
 use crate::store::StoreError;
@@ -33,6 +35,9 @@ pub enum CliError {
     /// Exit code 5: the vehicle said no.
     #[error("{0}")]
     Refused(String),
+    /// Exit code 6: the QPU gave nothing, and no fallback was allowed.
+    #[error("{0}")]
+    Qpu(String),
 }
 
 impl CliError {
@@ -44,6 +49,7 @@ impl CliError {
             Self::NoPath { .. } => 3,
             Self::Unreachable(_) => 4,
             Self::Refused(_) => 5,
+            Self::Qpu(_) => 6,
         }
     }
 
@@ -82,7 +88,17 @@ macro_rules! usage_errors {
     )*};
 }
 
+impl From<IbmError> for CliError {
+    fn from(error: IbmError) -> Self {
+        match error {
+            IbmError::Account(error) => Self::Usage(error.to_string()),
+            error => Self::Qpu(error.to_string()),
+        }
+    }
+}
+
 usage_errors!(
+    ConfigError,
     FileError,
     FormatError,
     FenceItemError,
@@ -96,6 +112,8 @@ impl From<ReplanError> for CliError {
         let reason = error.to_string();
         if error.is_no_path() {
             Self::NoPath { reason, document: None }
+        } else if error.is_qpu_failure() {
+            Self::Qpu(reason)
         } else {
             Self::Usage(reason)
         }

@@ -8,7 +8,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::CliError;
 use super::files::{self, out_format};
-use super::options::PlanningArgs;
+use super::options::{PlanningArgs, VehicleArgs, as_qpu};
 use super::plan::{Delivered, Outcome, planned_scenario};
 use super::progress::Shown;
 use super::signing::SigningArgs;
@@ -16,17 +16,18 @@ use crate::fence::items::decode_fence;
 use crate::fence::{FenceSet, VehicleRules};
 use crate::formats::Scenario;
 use crate::geodesy::LatLon;
-use crate::link::{ComponentId, Endpoint, Identity, Link, Signer, SystemId, Transport};
-use crate::mission::{self, Mission, MissionItem, MissionType};
-use crate::replan::{self, Input, Options, Replanned, replan};
-use crate::report::picture::picture;
+use crate::ibm::qpu::IbmQpu;
+use crate::link::{Endpoint, Link, Signer, Transport};
+use crate::mission::{self, LoiterHabit, Mission, MissionItem, MissionType};
+use crate::replan::{self, Input, Options, Replanned, replan_with};
+use crate::report::Report;
 use crate::stop::Stop;
 use crate::store::Store;
 use crate::vehicle::download::Downloaded;
 use crate::vehicle::numbering::{to_mission, to_vehicle};
 use crate::vehicle::readback::differences;
 use crate::vehicle::replace::{Replacement, WhileArmed, pilots_own, replace, restore, settle};
-use crate::vehicle::{Autopilot, Search, Vehicle, find};
+use crate::vehicle::{Autopilot, TransferError, Vehicle, find};
 
 /// How long to wait for the vehicle's home and position.
 const PLACE_PATIENCE: Duration = Duration::from_secs(5);
@@ -44,23 +45,14 @@ pub struct OnceArgs {
     /// Put back the mission (and fence) that the vehicle held before quavd wrote to it, and exit.
     #[arg(long, conflicts_with_all = ["dry_run", "out"])]
     pub restore: bool,
-    /// The vehicle's system id, where several are on the link.
-    #[arg(long, value_parser = clap::value_parser!(u8).range(1..))]
-    pub system: Option<u8>,
-    /// quavd's own component id on the vehicle.
-    #[arg(long, default_value_t = 195, value_parser = clap::value_parser!(u8).range(2..))]
-    pub component: u8,
-    /// How long to wait for the vehicle's first heartbeat, seconds.
-    #[arg(long, default_value_t = 15, value_parser = clap::value_parser!(u16).range(1..), value_name = "S")]
-    pub wait: u16,
-    /// Where originals and upload records are kept.
-    #[arg(long, env = "STATE_DIRECTORY", value_name = "DIR")]
-    pub state_dir: Option<PathBuf>,
+    /// Which vehicle.
+    #[command(flatten)]
+    pub vehicle: VehicleArgs,
     /// Print one JSON document on stdout.
     #[arg(long)]
     pub json: bool,
-    /// Write the result to a file; the suffix gives the format (.plan, .waypoints, .geojson, .kml,
-    /// .svg). May be repeated.
+    /// Write the result to a file; the suffix gives the format (.plan, .waypoints, .fence, .rally,
+    /// .fen, .geojson, .kml, .kmz; .svg, .png or .html to look at). May be repeated.
     #[arg(long, value_name = "FILE")]
     pub out: Vec<PathBuf>,
     /// Who is believed.
@@ -89,14 +81,10 @@ pub fn run(args: OnceArgs, shown: &Shown) -> Result<String, CliError> {
         shown.doing(format!("connecting to {}", args.connect));
         let mut transport = Transport::open(&args.connect).await?;
         if let Some(settings) = args.signing.settings() {
-            let state = state_directory(args.state_dir.as_ref())?;
-            transport = transport.signed(Signer::open(&settings, &state)?);
+            transport =
+                transport.signed(Signer::open(&settings, &args.vehicle.state_directory()?)?);
         }
-        let identity = Identity {
-            system: SystemId(args.system.unwrap_or(1)),
-            component: ComponentId(args.component),
-        };
-        let (link, task) = Link::start(transport, identity, cancel);
+        let (link, task) = Link::start(transport, args.vehicle.identity(), cancel);
         let outcome = with_link(&args, &link, shown).await;
         shown.clear();
         task.close().await;
@@ -105,14 +93,9 @@ pub fn run(args: OnceArgs, shown: &Shown) -> Result<String, CliError> {
 }
 
 async fn with_link(args: &OnceArgs, link: &Link, shown: &Shown) -> Result<String, CliError> {
-    let store = Store::open(&state_directory(args.state_dir.as_ref())?)?;
+    let store = Store::open(&args.vehicle.state_directory()?)?;
     shown.doing("waiting for the vehicle");
-    let search = Search {
-        system: args.system.map(SystemId),
-        patience: Duration::from_secs(u64::from(args.wait)),
-        ..Search::default()
-    };
-    let vehicle = find(link, &search).await?;
+    let vehicle = find(link, &args.vehicle.search()).await?;
     let outcome = with_vehicle(args, &vehicle, &store, shown).await;
     vehicle.close().await;
     outcome
@@ -139,19 +122,18 @@ async fn with_vehicle(
     }
 
     let began = Instant::now();
-    shown.doing("reading the vehicle's parameters");
-    let (rules, loiter) = vehicle.rules().await?;
-    let read = read(vehicle, store, args, &rules, shown).await?;
+    let held = Held::download(vehicle, shown).await?;
+    let read = read(vehicle, store, &args.planning, held, shown).await?;
     shown.warn(&read.scenario.warnings);
-    let inclusion = args.planning.safety.inclusion.0;
-    let options = args.planning.options().with_rules(rules, inclusion, loiter);
+    let options = read.options(&args.planning);
     if read.scenario.mission.items.is_empty() {
         return Err(CliError::Usage(
             "the vehicle holds no mission; upload one with a ground station first".to_owned(),
         ));
     }
     let load = began.elapsed();
-    let planned = plan_off_thread(&read, &options, shown).await;
+    let qpu = args.planning.qpu(args.vehicle.state_dir.as_ref())?;
+    let planned = plan_off_thread(&read, &options, qpu, shown).await;
     let warnings = &read.scenario.warnings;
     let total = began.elapsed();
     let outcome = Outcome { planned, before: None, options: &options, warnings, load, total };
@@ -179,9 +161,9 @@ async fn with_vehicle(
             done = Delivery { written: true, verified: true };
         }
         shown.clear();
-        files::write_all(&args.out, &planned_scenario(&read.scenario, planned), || {
-            picture(planned, &outcome.run(), &format!("mission of {}", args.connect))
-        })?;
+        let title = format!("mission of {}", args.connect);
+        let report = Report::planned(planned, outcome.run(), &title, &read.scenario.fences);
+        files::write_all(&args.out, &planned_scenario(&read.scenario, planned), &report)?;
     }
     outcome.told(args.json, Some(done.told(vehicle, args.dry_run)))
 }
@@ -201,54 +183,89 @@ async fn put_back(vehicle: &Vehicle, store: &Store, shown: &Shown) -> Result<Str
 }
 
 /// What was read from a vehicle.
-struct Read {
+pub(crate) struct Read {
     /// The pilot's mission, the fences with those of the command line, the rally points.
-    scenario: Scenario,
+    pub(crate) scenario: Scenario,
     /// The mission list that the vehicle holds, in its numbering.
-    held: Vec<MissionItem>,
+    pub(crate) held: Vec<MissionItem>,
     /// The pilot's own mission list: what is held, or what quavd's last upload was made from.
-    original: Vec<MissionItem>,
-    start: Option<LatLon>,
-    rally: Vec<LatLon>,
-    autopilot: mission::Autopilot,
+    pub(crate) original: Vec<MissionItem>,
+    pub(crate) start: Option<LatLon>,
+    pub(crate) rally: Vec<LatLon>,
+    pub(crate) autopilot: mission::Autopilot,
+    /// What the vehicle's parameters say about its fence.
+    rules: VehicleRules,
+    loiter: LoiterHabit,
 }
 
-async fn read(
+impl Read {
+    /// The options for planning for this vehicle.
+    pub(crate) fn options(&self, planning: &PlanningArgs) -> Options {
+        let inclusion = planning.safety.inclusion.0;
+        planning.options().with_rules(self.rules.clone(), inclusion, self.loiter)
+    }
+}
+
+/// The three plans of a vehicle, as downloaded.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Held {
+    pub(crate) mission: Vec<MissionItem>,
+    pub(crate) fence: Vec<MissionItem>,
+    pub(crate) rally: Vec<MissionItem>,
+    /// Which of them came in another way than was tried first, and why.
+    pub(crate) fell_back: Vec<String>,
+}
+
+impl Held {
+    /// Downloads all three.
+    pub(crate) async fn download(vehicle: &Vehicle, shown: &Shown) -> Result<Self, TransferError> {
+        let mut on_progress = |progress| shown.transfer(progress);
+        let mission = vehicle.read_plan(MissionType::Mission, &mut on_progress).await?;
+        let fence = vehicle.read_plan(MissionType::Fence, &mut on_progress).await?;
+        let rally = vehicle.read_plan(MissionType::Rally, &mut on_progress).await?;
+        let fell_back = [&mission, &fence, &rally].into_iter().filter_map(Downloaded::fell_back);
+        Ok(Self {
+            fell_back: fell_back.collect(),
+            mission: mission.items,
+            fence: fence.items,
+            rally: rally.items,
+        })
+    }
+}
+
+/// What the plans of a vehicle mean, with what else planning starts from.
+pub(crate) async fn read(
     vehicle: &Vehicle,
     store: &Store,
-    args: &OnceArgs,
-    rules: &VehicleRules,
+    planning: &PlanningArgs,
+    held: Held,
     shown: &Shown,
 ) -> Result<Read, CliError> {
-    let mut on_progress = |progress| shown.transfer(progress);
-    let mission = vehicle.read_plan(MissionType::Mission, &mut on_progress).await?;
-    let fence = vehicle.read_plan(MissionType::Fence, &mut on_progress).await?;
-    let rally = vehicle.read_plan(MissionType::Rally, &mut on_progress).await?;
-    let fell_back: Vec<String> =
-        [&mission, &fence, &rally].into_iter().filter_map(Downloaded::fell_back).collect();
-    let (held, fence, rally) = (mission.items, fence.items, rally.items);
     shown.doing("waiting for the vehicle's home and position");
     let known =
         |state: &crate::vehicle::VehicleState| state.home.is_some() && state.position.is_some();
     let _ = vehicle.wait_for(PLACE_PATIENCE, known).await;
     let state = vehicle.state();
 
+    let Held { mission: held, fence, rally, fell_back } = held;
     let original = pilots_own(vehicle, store, MissionType::Mission, &held).await?;
     let mission = to_mission(vehicle.autopilot(), &original, state.home);
     let decoded = decode_fence(&fence, None)?;
     let (mut fences, mut warnings) = (decoded.fences, fell_back);
     warnings.extend(decoded.warnings);
-    if args.planning.safety.ignore_disabled_fence {
+    shown.doing("reading the vehicle's parameters");
+    let (rules, loiter) = vehicle.rules().await?;
+    if planning.safety.ignore_disabled_fence {
         warnings.extend(rules.leave_out_disabled(&mut fences));
     }
     warnings.extend(rules.odd_inclusions(&fences, mission.home.map(|home| home.position)));
-    files::add_fences(&mut fences, &mut warnings, &args.planning.safety)?;
+    files::add_fences(&mut fences, &mut warnings, &planning.safety)?;
     let places = rally_places(&rally)?;
     // The vehicle stands at home before it takes off; in flight its own place counts.
     let start = state.position.map(|at| at.position).or(mission.home.map(|home| home.position));
     let scenario = Scenario { mission, fences, rally, warnings, ..Scenario::default() };
     let autopilot = vehicle.autopilot().into();
-    Ok(Read { scenario, held, original, start, rally: places, autopilot })
+    Ok(Read { scenario, held, original, start, rally: places, autopilot, rules, loiter })
 }
 
 /// The places of rally points.
@@ -270,6 +287,7 @@ pub(super) fn rally_places(rally: &[MissionItem]) -> Result<Vec<LatLon>, CliErro
 async fn plan_off_thread(
     read: &Read,
     options: &Options,
+    mut qpu: Option<IbmQpu>,
     shown: &Shown,
 ) -> Result<Replanned, CliError> {
     let stop = Stop::new();
@@ -282,7 +300,7 @@ async fn plan_off_thread(
             let input =
                 Input { mission: &mission, fences: &fences, rally: &rally, start, autopilot };
             let watch = |progress: replan::Progress<'_>| shown.planning(&progress);
-            replan(&input, &options, &stop, watch)
+            replan_with(&input, &options, as_qpu(&mut qpu), &stop, watch)
         })
     };
     tokio::pin!(task);
@@ -327,18 +345,4 @@ impl Delivery {
             note,
         }
     }
-}
-
-/// Where records are kept: the option (or systemd's `STATE_DIRECTORY`), else the user's state
-/// directory.
-fn state_directory(chosen: Option<&PathBuf>) -> Result<PathBuf, CliError> {
-    if let Some(path) = chosen {
-        return Ok(path.clone());
-    }
-    let base = std::env::var_os("XDG_STATE_HOME")
-        .map(PathBuf::from)
-        .filter(|path| path.is_absolute())
-        .or_else(|| std::env::home_dir().map(|home| home.join(".local/state")));
-    base.map(|base| base.join("quavd"))
-        .ok_or_else(|| CliError::Usage("no place for records: give --state-dir DIR".to_owned()))
 }

@@ -5,13 +5,19 @@ use std::time::Duration;
 
 use clap::Args;
 
-use super::memory;
+use super::ibm::account::AccountArgs;
+use super::{CliError, memory};
 use crate::fence::InclusionRule;
 use crate::geodesy::Zone;
-use crate::planner::{CandidateSource, Rounds, Settings};
-use crate::qaoa::EngineChoice;
+use crate::ibm::client::backends::BackendChoice;
+use crate::ibm::qpu::IbmQpu;
+use crate::link::{ComponentId, Identity, SystemId};
+use crate::planner::{CandidateSource, QpuSettings, QpuTraining, Rounds, Settings};
+use crate::qaoa::qpu::Qpu;
+use crate::qaoa::{EngineChoice, EngineKind};
 use crate::replan::{Options, Vertical};
 use crate::units::Metres;
+use crate::vehicle::Search;
 
 /// Distances to keep and fences to respect, for planning and checking.
 #[derive(Debug, Clone, Args)]
@@ -94,6 +100,14 @@ fn lambda(text: &str) -> Result<f64, String> {
     number(text, 0.0, 1000.0)
 }
 
+/// The share of measurements that CVaR looks at.
+///
+/// # Errors
+/// What a user should give instead.
+pub(super) fn cvar(text: &str) -> Result<f64, String> {
+    number(text, 0.001, 1.0)
+}
+
 fn deadline(text: &str) -> Result<f64, String> {
     number(text, 0.001, 1e6)
 }
@@ -102,13 +116,73 @@ fn learning_rate(text: &str) -> Result<f64, String> {
     number(text, 1e-6, 10.0)
 }
 
+/// Which vehicle, who quavd is on it, and where its plans are kept safe.
+#[derive(Debug, Clone, Args)]
+pub struct VehicleArgs {
+    /// The vehicle's system id, where several are on the link.
+    #[arg(long, value_parser = clap::value_parser!(u8).range(1..), value_name = "ID")]
+    pub system: Option<u8>,
+    /// quavd's own component id on the vehicle.
+    #[arg(long, default_value_t = 195, value_parser = clap::value_parser!(u8).range(2..), value_name = "ID")]
+    pub component: u8,
+    /// How long to wait for the vehicle's first heartbeat, seconds.
+    #[arg(long, default_value_t = 15, value_parser = clap::value_parser!(u16).range(1..), value_name = "S")]
+    pub wait: u16,
+    /// Where originals and upload records are kept.
+    #[arg(long, env = "STATE_DIRECTORY", value_name = "DIR")]
+    pub state_dir: Option<PathBuf>,
+}
+
+impl VehicleArgs {
+    /// Who quavd is.
+    #[must_use]
+    pub fn identity(&self) -> Identity {
+        Identity {
+            system: SystemId(self.system.unwrap_or(1)),
+            component: ComponentId(self.component),
+        }
+    }
+
+    /// Whom to look for, and for how long.
+    #[must_use]
+    pub fn search(&self) -> Search {
+        Search {
+            system: self.system.map(SystemId),
+            patience: Duration::from_secs(u64::from(self.wait)),
+            ..Search::default()
+        }
+    }
+
+    /// Where records are kept.
+    ///
+    /// # Errors
+    /// [`CliError::Usage`] where no place is given and the user has no home.
+    pub fn state_directory(&self) -> Result<PathBuf, CliError> {
+        state_directory(self.state_dir.as_ref())
+    }
+}
+
+/// The option (or systemd's `STATE_DIRECTORY`), else the user's state directory.
+pub(super) fn state_directory(chosen: Option<&PathBuf>) -> Result<PathBuf, CliError> {
+    if let Some(path) = chosen {
+        return Ok(path.clone());
+    }
+    let base = std::env::var_os("XDG_STATE_HOME")
+        .map(PathBuf::from)
+        .filter(|path| path.is_absolute())
+        .or_else(|| std::env::home_dir().map(|home| home.join(".local/state")));
+    base.map(|base| base.join("quavd"))
+        .ok_or_else(|| CliError::Usage("no place for records: give --state-dir DIR".to_owned()))
+}
+
 /// How to plan.
 #[derive(Debug, Clone, Args)]
 pub struct PlanningArgs {
     /// Distances and fences.
     #[command(flatten)]
     pub safety: SafetyArgs,
-    /// Edges of a leg's path, one qubit each; legs with more corners get more.
+    /// Edges of a leg's path, one qubit each. Legs with more corners get more; engines other than
+    /// chain then take them in windows of this many qubits.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u16).range(2..=2000))]
     pub qubits: u16,
     /// QAOA layers.
@@ -120,6 +194,10 @@ pub struct PlanningArgs {
     /// Adam's learning rate.
     #[arg(long, default_value_t = 0.1, value_parser = learning_rate)]
     pub learning_rate: f64,
+    /// Train on the mean of this share of the best measurements (CVaR) instead of ⟨H⟩: exact with the
+    /// statevector engine, estimated from --shots samples at every step with the chain engine.
+    #[arg(long, value_parser = cvar, value_name = "ALPHA")]
+    pub cvar: Option<f64>,
     /// Shots of each QAOA run.
     #[arg(long, default_value_t = 1024, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub shots: u32,
@@ -139,7 +217,7 @@ pub struct PlanningArgs {
     /// What being near an obstacle costs, metres: λ of λ·exp(−d/buffer). Higher keeps further off.
     #[arg(long, default_value_t = 0.05, value_parser = lambda, value_name = "M")]
     pub lambda: f64,
-    /// QAOA engine: auto, chain or statevector.
+    /// QAOA engine: auto, chain, statevector, or ibm (a QPU; see the options below).
     #[arg(long, default_value = "auto", value_name = "ENGINE")]
     pub engine: EngineChoice,
     /// How long planning may take, seconds; then the best clear path until then is used, and the
@@ -148,8 +226,52 @@ pub struct PlanningArgs {
     pub deadline: Option<f64>,
     /// Exactly the settings of the paper's table: 20 qubits, 5 layers, 60 Adam steps at 0.1 in
     /// every round, 5 m buffer, grid candidates.
-    #[arg(long, conflicts_with_all = ["buffer", "qubits", "layers", "steps", "learning_rate", "candidates", "grid"])]
+    #[arg(long, conflicts_with_all = ["buffer", "qubits", "layers", "steps", "learning_rate", "cvar", "candidates", "grid"])]
     pub paper: bool,
+    /// On a QPU.
+    #[command(flatten)]
+    pub qpu: QpuArgs,
+}
+
+/// How to plan with `--engine ibm`.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Options of --engine ibm")]
+pub struct QpuArgs {
+    /// The backend: a name, or least_busy. With --paper it is ibm_kyiv, if nothing is said.
+    #[arg(long, value_name = "NAME")]
+    pub backend: Option<BackendChoice>,
+    /// Where angles are trained: local (the exact engine) or qpu (20 Adam steps, a job each).
+    #[arg(long, default_value = "local", value_name = "local|qpu")]
+    pub train: QpuTraining,
+    /// Jobs of a leg at most, those of a training not counted.
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..=100))]
+    pub qpu_jobs: u16,
+    /// Circuits in a job, a QAOA round each.
+    #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u16).range(1..=100))]
+    pub qpu_circuits: u16,
+    /// End with exit code 6 where the QPU gives nothing, instead of planning locally.
+    #[arg(long)]
+    pub no_fallback: bool,
+    /// Who pays.
+    #[command(flatten)]
+    pub account: AccountArgs,
+}
+
+impl QpuArgs {
+    fn settings(&self) -> QpuSettings {
+        QpuSettings {
+            training: self.train,
+            jobs: usize::from(self.qpu_jobs),
+            circuits: usize::from(self.qpu_circuits),
+            fallback: !self.no_fallback,
+            ..QpuSettings::default()
+        }
+    }
+}
+
+/// The QPU as the planner takes it.
+pub(crate) fn as_qpu(qpu: &mut Option<IbmQpu>) -> Option<&mut dyn Qpu> {
+    qpu.as_mut().map(|qpu| qpu as &mut dyn Qpu)
 }
 
 impl SafetyArgs {
@@ -171,6 +293,21 @@ impl SafetyArgs {
 }
 
 impl PlanningArgs {
+    /// The QPU, where one was asked for. Its record of jobs is in the state directory.
+    ///
+    /// # Errors
+    /// [`CliError`] without usable credentials or a usable state directory.
+    pub fn qpu(&self, state: Option<&PathBuf>) -> Result<Option<IbmQpu>, CliError> {
+        if self.engine != EngineChoice::Only(EngineKind::Ibm) {
+            return Ok(None);
+        }
+        let choice = self.qpu.backend.clone().unwrap_or(match self.paper {
+            true => BackendChoice::Named("ibm_kyiv".to_owned()),
+            false => BackendChoice::LeastBusy,
+        });
+        self.qpu.account.qpu(&choice, &state_directory(state)?).map(Some)
+    }
+
     /// The options of the library.
     #[must_use]
     pub fn options(&self) -> Options {
@@ -180,6 +317,7 @@ impl PlanningArgs {
             layers: usize::from(self.layers),
             steps: self.steps as usize,
             learning_rate: self.learning_rate,
+            cvar: self.cvar,
             grid: Metres(self.grid),
             source: self.candidates,
             ..Settings::default()
@@ -192,6 +330,7 @@ impl PlanningArgs {
             lambda: Metres(self.lambda),
             engine: self.engine,
             memory_limit: memory::available(),
+            qpu: self.qpu.settings(),
             ..base
         };
         let deadline = self.deadline.map(Duration::from_secs_f64);

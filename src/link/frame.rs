@@ -58,6 +58,12 @@ impl Received {
         })
     }
 
+    /// A frame as if it had come in, for tests of what reads frames.
+    #[cfg(test)]
+    pub(crate) fn from_packet(from: Node, packet: &Packet) -> Self {
+        Self::new(&MAVLinkMessageRaw::V2(packet.to_frame(from, 0, None)), None).unwrap()
+    }
+
     /// The message, where it is a `D` that can be decoded.
     #[must_use]
     pub fn decode<D: MessageData>(&self) -> Option<D> {

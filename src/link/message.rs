@@ -14,8 +14,9 @@ use mavlink::{MavlinkVersion, MessageData};
 use super::id::{ComponentId, Node, SystemId};
 use crate::mission::{Command, Frame, MissionItem};
 
+pub use command::{CommandAck, CommandInt, CommandLong};
 pub use file_transfer::FileTransfer;
-pub use parameter::{ParamError, ParamName, ParamRequestRead, ParamValue};
+pub use parameter::{ParamError, ParamName, ParamRequestRead, ParamSet, ParamValue};
 
 /// Reads little-endian fields from a payload; what the sender truncated reads as zero.
 struct Fields<'a>(&'a [u8]);
@@ -80,6 +81,7 @@ macro_rules! message {
     };
 }
 
+mod command;
 mod file_transfer;
 mod parameter;
 
@@ -337,7 +339,7 @@ impl MissionAck {
 message!(MissionAck, "MISSION_ACK", id 47, crc 153, length 8);
 
 /// MISSION_CURRENT (42): which item is flown.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MissionCurrent {
     /// The current item, in the vehicle's own numbering.
     pub seq: u16,
@@ -370,29 +372,6 @@ impl MissionCurrent {
     }
 }
 message!(MissionCurrent, "MISSION_CURRENT", id 42, crc 28, length 18);
-
-/// COMMAND_ACK (77).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct CommandAck {
-    /// `MAV_CMD` that is answered.
-    pub command: u16,
-    /// `MAV_RESULT`; 0 is "accepted".
-    pub result: u8,
-    /// To whom; 0 in both where the firmware is old.
-    pub target: Node,
-}
-
-impl CommandAck {
-    fn encode(&self) -> [u8; 10] {
-        let target = [self.target.system.0, self.target.component.0];
-        joined(&[&self.command.to_le_bytes(), &[self.result, 0, 0, 0, 0, 0], &target])
-    }
-
-    fn decode(fields: &Fields<'_>) -> Self {
-        Self { command: fields.u16(0), result: fields.u8(2), target: fields.node(8) }
-    }
-}
-message!(CommandAck, "COMMAND_ACK", id 77, crc 143, length 10);
 
 /// STATUSTEXT (253): one chunk of a text for people.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -13,6 +13,7 @@ use super::trellis::EdgeJudge;
 use crate::airspace::RegionId;
 use crate::geodesy::{LatLon, LocalFrame, ProjectionError, Xy};
 use crate::qaoa::Qaoa;
+use crate::qaoa::qpu::Qpu;
 use crate::stop::{Stop, Stopped};
 
 /// A leg to plan.
@@ -39,6 +40,8 @@ pub struct LegPlan {
     pub rounds: Vec<Round>,
     /// Whether the deadline passed before these had brought all that they could.
     pub cut_short: bool,
+    /// What ran instead of the QPU that was asked for, and why.
+    pub fallback: Option<String>,
     /// How long it took.
     pub times: LegTimes,
 }
@@ -134,7 +137,8 @@ impl LegPlanner {
     }
 
     /// Plans one leg. `watch` is called after each round. The rounds get one of `parts` equal
-    /// parts of the time that `stop` leaves them: as many as there are legs still to be planned.
+    /// parts of the time that `stop` leaves them: as many as there are legs still to be planned. They are
+    /// run on `qpu`, if there is one.
     /// When that is over, the best clear path until then is the plan.
     ///
     /// # Errors
@@ -146,6 +150,22 @@ impl LegPlanner {
         space: &LegSpace<'_>,
         stop: &Stop,
         parts: usize,
+        watch: impl FnMut(&Round),
+    ) -> Result<LegOutcome, PlanError> {
+        self.plan_with(request, frame, space, (stop, parts), None, watch)
+    }
+
+    /// [`LegPlanner::plan`] with the rounds on a QPU, if there is one.
+    ///
+    /// # Errors
+    /// [`PlanError`] with the reason where there is no path.
+    pub fn plan_with(
+        &mut self,
+        request: &LegRequest,
+        frame: &LocalFrame,
+        space: &LegSpace<'_>,
+        (stop, parts): (&Stop, usize),
+        qpu: Option<&mut dyn Qpu>,
         watch: impl FnMut(&Round),
     ) -> Result<LegOutcome, PlanError> {
         let (start, goal) = (frame.to_local(request.from)?, frame.to_local(request.to)?);
@@ -177,7 +197,11 @@ impl LegPlanner {
         };
         let share = stop.share(parts);
         let contest = Contest::new(&found[0], judge, &self.settings, &mut self.qaoa, &share);
-        let Contested { path, rounds, cut_short } = contest.run(&found[1..], watch)?;
+        let contested = match qpu {
+            Some(qpu) => contest.run_on_qpu(qpu, &found[1..], watch)?,
+            None => contest.run(&found[1..], watch)?,
+        };
+        let Contested { path, rounds, cut_short, fallback } = contested;
         times.qaoa = began.elapsed();
 
         let began = Instant::now();
@@ -191,7 +215,7 @@ impl LegPlanner {
         )?;
         reaches_are_clear(request, space, &finished.points)?;
         times.finish = began.elapsed();
-        let plan = LegPlan { finished, candidates: found, rounds, cut_short, times };
+        let plan = LegPlan { finished, candidates: found, rounds, cut_short, fallback, times };
         Ok(LegOutcome::Replanned(Box::new(plan)))
     }
 }

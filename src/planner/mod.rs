@@ -12,6 +12,7 @@
 //! - [`trellis`]: two polylines as an Ising chain;
 //! - [`moves`]: challengers for refinement;
 //! - [`rounds`]: QAOA decides, round after round;
+//! - [`qpu_rounds`]: the same on a QPU, many to a job;
 //! - [`finish`]: few waypoints, on the integers that the vehicle flies;
 //! - [`enclosure`]: proof that there is no way;
 //! - [`leg`]: all of it for one leg.
@@ -28,6 +29,7 @@ pub mod leg;
 pub mod leg_space;
 pub mod moves;
 pub mod polyline;
+pub mod qpu_rounds;
 pub mod rounds;
 pub mod search;
 pub mod settings;
@@ -36,4 +38,4 @@ mod sweep;
 pub mod trellis;
 
 pub use leg::{LegOutcome, LegPlan, LegPlanner, PlanError};
-pub use settings::{CandidateSource, Rounds, Settings};
+pub use settings::{CandidateSource, QpuSettings, QpuTraining, Rounds, Settings};

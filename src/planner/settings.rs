@@ -67,6 +67,50 @@ impl std::str::FromStr for Rounds {
     }
 }
 
+/// Where the angles of circuits for a QPU are trained.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum QpuTraining {
+    /// By the exact local engine; the QPU only samples.
+    #[default]
+    Local,
+    /// On the QPU, as in the paper: the first circuit of a leg is trained there, and the others carry its
+    /// angles over.
+    Qpu,
+}
+
+impl std::str::FromStr for QpuTraining {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "local" => Ok(Self::Local),
+            "qpu" => Ok(Self::Qpu),
+            _ => Err(format!("'{text}' is neither local nor qpu")),
+        }
+    }
+}
+
+/// How a leg is planned on a QPU.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct QpuSettings {
+    /// Where angles are trained.
+    pub training: QpuTraining,
+    /// Adam steps of a training on the QPU (paper: 20).
+    pub steps: usize,
+    /// Jobs of a leg at most, those of a training not counted.
+    pub jobs: usize,
+    /// Circuits in each of them, one QAOA round each.
+    pub circuits: usize,
+    /// Whether the local engine goes on where the QPU gives nothing.
+    pub fallback: bool,
+}
+
+impl Default for QpuSettings {
+    fn default() -> Self {
+        Self { training: QpuTraining::Local, steps: 20, jobs: 3, circuits: 6, fallback: true }
+    }
+}
+
 /// How a leg is planned. The defaults are the paper's table of settings, where it has one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
@@ -81,6 +125,8 @@ pub struct Settings {
     pub steps: usize,
     /// Adam's learning rate (paper: 0.1).
     pub learning_rate: f64,
+    /// Train on the mean of this share of the best measurements instead of ⟨H⟩ (CVaR).
+    pub cvar: Option<f64>,
     /// Shots of each run.
     pub shots: u32,
     /// QAOA runs for each leg.
@@ -102,6 +148,8 @@ pub struct Settings {
     pub full_training: bool,
     /// Memory that an engine may use, bytes.
     pub memory_limit: u64,
+    /// What is different on a QPU.
+    pub qpu: QpuSettings,
 }
 
 impl Default for Settings {
@@ -112,6 +160,7 @@ impl Default for Settings {
             layers: 5,
             steps: 60,
             learning_rate: 0.1,
+            cvar: None,
             shots: 1024,
             rounds: Rounds::Auto,
             seed: 0,
@@ -122,6 +171,7 @@ impl Default for Settings {
             engine: EngineChoice::Auto,
             full_training: false,
             memory_limit: 4 << 30,
+            qpu: QpuSettings::default(),
         }
     }
 }

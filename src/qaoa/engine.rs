@@ -18,6 +18,8 @@ pub enum EngineKind {
     Chain,
     /// Exact, for any graph; 2ⁿ amplitudes.
     Statevector,
+    /// No simulator: an IBM QPU, for open chains.
+    Ibm,
 }
 
 impl fmt::Display for EngineKind {
@@ -25,6 +27,7 @@ impl fmt::Display for EngineKind {
         f.pad(match self {
             Self::Chain => "chain",
             Self::Statevector => "statevector",
+            Self::Ibm => "ibm",
         })
     }
 }
@@ -39,10 +42,33 @@ pub enum EngineChoice {
     Only(EngineKind),
 }
 
+impl EngineChoice {
+    /// The most qubits of one run where a chain has more than `preferred`: `chain` is linear in their
+    /// number and takes any; on others a window of `preferred` qubits slides along.
+    #[must_use]
+    pub fn most_qubits(self, preferred: usize) -> usize {
+        match self {
+            Self::Auto | Self::Only(EngineKind::Chain) => usize::MAX,
+            Self::Only(_) => preferred,
+        }
+    }
+}
+
 /// A name that is no engine.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("there is no engine {0:?}; choose auto, chain or statevector")]
+#[error("there is no engine {0:?}; choose auto, chain, statevector or ibm")]
 pub struct NoSuchEngine(String);
+
+impl EngineChoice {
+    /// Which simulator trains, and runs what a QPU does not.
+    #[must_use]
+    pub fn local(self) -> Self {
+        match self {
+            Self::Only(EngineKind::Ibm) => Self::Auto,
+            choice => choice,
+        }
+    }
+}
 
 impl FromStr for EngineChoice {
     type Err = NoSuchEngine;
@@ -52,6 +78,7 @@ impl FromStr for EngineChoice {
             "auto" => Ok(Self::Auto),
             "chain" => Ok(Self::Only(EngineKind::Chain)),
             "statevector" => Ok(Self::Only(EngineKind::Statevector)),
+            "ibm" => Ok(Self::Only(EngineKind::Ibm)),
             other => Err(NoSuchEngine(other.into())),
         }
     }
@@ -79,6 +106,11 @@ pub enum EngineError {
         /// Second qubit.
         j: usize,
     },
+    /// A QPU was asked for where only simulators run.
+    #[error(
+        "the ibm engine is no simulator; it runs with quavd plan, once and run, and with quavd ibm run"
+    )]
+    NoQpu,
     /// The workspace would not fit.
     #[error(
         "the {engine} engine needs {} MiB for {qubits} qubits, but {} MiB are available; use fewer \
@@ -141,6 +173,23 @@ pub trait Engine {
     /// # Errors
     /// If the circuit has too many layers or does not fit into memory.
     fn expectation_and_gradient(&mut self, angles: &Angles) -> Result<(f64, Angles), EngineError>;
+
+    /// The CVaR objective and its derivatives: the mean energy of the best share `alpha` (above 0, at
+    /// most 1) of all measurements. Exact where [`Engine::cvar_is_exact`] says so, and else estimated
+    /// from `shots` samples as the module [`super::cvar`] defines it.
+    ///
+    /// # Errors
+    /// If the circuit has too many layers or does not fit into memory.
+    fn cvar_and_gradient(
+        &mut self,
+        angles: &Angles,
+        alpha: f64,
+        shots: u32,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<(f64, Angles), EngineError>;
+
+    /// Whether CVaR is exact, without samples.
+    fn cvar_is_exact(&self) -> bool;
 
     /// Measures every qubit `shots` times; distinct bitstrings in ascending order. The same `rng` state
     /// gives the same samples.

@@ -26,7 +26,7 @@ use crate::planner::Settings;
 pub use altitudes::Vertical;
 pub use field::{Field, FieldError};
 pub use judge::{LegVerdict, Verdict, fields, judge};
-pub use plan::{LegRecord, Progress, Replanned, Stage, replan};
+pub use plan::{LegRecord, Progress, Replanned, Stage, replan, replan_with};
 pub use reason::ReplanError;
 
 /// What a mission is judged or planned with.

@@ -15,6 +15,7 @@ use crate::planner::candidates::Candidate;
 use crate::planner::leg::{LegRequest, LegTimes};
 use crate::planner::rounds::Round;
 use crate::planner::{LegOutcome, LegPlan, LegPlanner};
+use crate::qaoa::qpu::{Qpu, QpuUse};
 use crate::stop::Stop;
 
 /// What happens while a mission is planned.
@@ -78,6 +79,8 @@ pub struct LegRecord {
     pub rounds: Vec<Round>,
     /// Whether the deadline passed before these had brought all that they could.
     pub cut_short: bool,
+    /// What ran instead of the QPU that was asked for, and why.
+    pub fallback: Option<String>,
     /// Where the time went.
     pub times: LegTimes,
 }
@@ -99,6 +102,8 @@ pub struct Replanned {
     pub legs: Vec<LegRecord>,
     /// The zones, for pictures.
     pub fields: Vec<Field>,
+    /// What was used of a QPU, where one was asked for.
+    pub qpu: Option<QpuUse>,
 }
 
 impl Replanned {
@@ -121,7 +126,17 @@ impl Replanned {
                 format!("the {name} has the best clear path after {rounds} QAOA round{plural}")
             })
             .collect();
-        (!cut.is_empty()).then(|| format!("the deadline passed: {}", cut.join("; ")))
+        let cut = (!cut.is_empty()).then(|| format!("the deadline passed: {}", cut.join("; ")));
+        let mut fallbacks: Vec<String> = self
+            .legs
+            .iter()
+            .filter_map(|record| {
+                let fallback = record.fallback.as_ref()?;
+                Some(format!("the {} was planned by {fallback}", record.leg.name()))
+            })
+            .collect();
+        fallbacks.extend(cut);
+        (!fallbacks.is_empty()).then(|| fallbacks.join("; "))
     }
 }
 
@@ -134,6 +149,20 @@ impl Replanned {
 pub fn replan(
     input: &Input<'_>,
     options: &Options,
+    stop: &Stop,
+    watch: impl FnMut(Progress<'_>),
+) -> Result<Replanned, ReplanError> {
+    replan_with(input, options, None, stop, watch)
+}
+
+/// [`replan`] with the QAOA rounds on a QPU, if there is one.
+///
+/// # Errors
+/// [`ReplanError`] with the reason where there is no safe mission.
+pub fn replan_with(
+    input: &Input<'_>,
+    options: &Options,
+    mut qpu: Option<&mut dyn Qpu>,
     stop: &Stop,
     mut watch: impl FnMut(Progress<'_>),
 ) -> Result<Replanned, ReplanError> {
@@ -164,16 +193,27 @@ pub fn replan(
         let space = view.leg_space(options.settings.buffer.0, request.from, request.to);
         let mut number = 0;
         let outcome = planner
-            .plan(&request, view.frame, &space, &stop, legs - k, |round| {
-                number += 1;
-                tell(Stage::Round { number, round });
-            })
+            .plan_with(
+                &request,
+                view.frame,
+                &space,
+                (&stop, legs - k),
+                // A reborrow that ends with the leg.
+                match &mut qpu {
+                    Some(qpu) => Some(&mut **qpu),
+                    None => None,
+                },
+                |round| {
+                    number += 1;
+                    tell(Stage::Round { number, round });
+                },
+            )
             .map_err(|error| {
                 ReplanError::from_plan(error, leg, &|region| fields.name(region).to_owned())
             })?;
         tell(Stage::Planned);
         if let LegOutcome::Replanned(plan) = outcome {
-            let LegPlan { finished, candidates, rounds, cut_short, times } = *plan;
+            let LegPlan { finished, candidates, rounds, cut_short, fallback, times } = *plan;
             detours.push(Detour { leg: index, waypoints: finished.waypoints.clone() });
             records.push(LegRecord {
                 leg: *leg,
@@ -183,6 +223,7 @@ pub fn replan(
                 candidates,
                 rounds,
                 cut_short,
+                fallback,
                 times,
             });
         }
@@ -201,6 +242,7 @@ pub fn replan(
         after,
         legs: records,
         fields: fields.pictured(options.settings.buffer.0),
+        qpu: qpu.map(|qpu| qpu.used()),
     })
 }
 

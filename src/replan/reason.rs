@@ -127,6 +127,12 @@ impl ReplanError {
         )
     }
 
+    /// Whether a QPU gave nothing and nothing else was allowed (exit code 6).
+    #[must_use]
+    pub fn is_qpu_failure(&self) -> bool {
+        matches!(self, Self::Qaoa { cause: RoundError::Qpu(_), .. })
+    }
+
     pub(super) fn unjudged(leg: &Leg, why: &str) -> Self {
         Self::Unjudged { leg: leg.name().to_string(), why: why.to_owned() }
     }

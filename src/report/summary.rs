@@ -3,9 +3,9 @@
 use super::run::Run;
 use super::stretch::stretches;
 use super::text::{
-    Table, change, clearance, count, duration, finding, leg_label, push_wrapped, unbroken,
+    Table, best_gap, change, clearance, count, duration, finding, leg_label, push_wrapped, unbroken,
 };
-use crate::planner::rounds::Round;
+use crate::qaoa::qpu::QpuUse;
 use crate::replan::{LegRecord, LegVerdict, Replanned, Verdict};
 use crate::units::Metres;
 
@@ -57,6 +57,10 @@ pub fn plan_summary(result: &Replanned, run: &Run<'_>) -> String {
     }
     let notes: Vec<String> = result.notes.iter().map(ToString::to_string).collect();
     heights(&mut out, before);
+    if let Some(used) = &result.qpu {
+        out.push('\n');
+        push_wrapped(&mut out, &qpu_use(used), 4);
+    }
     let fallback = result.fallback();
     remarks(&mut out, fallback, run, before.warnings.iter().chain(&notes));
     out
@@ -81,6 +85,23 @@ fn heights(out: &mut String, verdict: &Verdict) {
     }
 }
 
+/// What was used of a QPU.
+fn qpu_use(used: &QpuUse) -> String {
+    let QpuUse { backend, jobs, picked_up, circuits, estimated_seconds, charged_seconds, .. } =
+        used;
+    let backend = if backend.is_empty() { "none" } else { backend };
+    let picked = match picked_up {
+        0 => String::new(),
+        picked => format!(", {picked} of them paid for by an earlier run"),
+    };
+    format!(
+        "QPU {backend}: {} with {}{picked}; {charged_seconds:.0} QPU seconds charged, at most \
+         {estimated_seconds:.0} estimated before.",
+        count(*jobs, "job"),
+        count(*circuits, "circuit"),
+    )
+}
+
 /// The re-planned legs.
 fn leg_table(result: &Replanned) -> Table {
     let mut table =
@@ -100,15 +121,6 @@ fn leg_table(result: &Replanned) -> Table {
         ]);
     }
     table
-}
-
-/// How near the best sample of any round came to the exact optimum of its chain.
-fn best_gap(rounds: &[Round]) -> String {
-    let gaps = rounds.iter().map(|round| round.gap).filter(|gap| gap.is_finite());
-    match gaps.reduce(f64::min) {
-        None => "-".to_owned(),
-        Some(gap) => format!("{:.2} m", (gap - 1e-9).max(0.0)),
-    }
 }
 
 fn time(record: &LegRecord) -> String {

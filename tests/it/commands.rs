@@ -8,7 +8,7 @@ use quav::mission::MissionType;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use crate::sitl::{FakeVehicle, PERSONAS, python};
+use crate::sitl::{FakeVehicle, PERSONAS};
 
 /// The scenarios with their exact shortest lengths, metres: bracketed from both sides to 1 cm by
 /// a solver that is not part of quavd.
@@ -53,15 +53,6 @@ impl Field {
         arguments.extend(more);
         quavd(&arguments)
     }
-
-    /// What the vehicle holds, by the measure of `judge.py`.
-    fn judged(&mut self) -> Value {
-        let dump = self.state.path().join("dump.json");
-        std::fs::write(&dump, self.vehicle.dump().to_string()).unwrap();
-        let output = Command::new(python()).arg(root("sitl/judge.py")).arg(&dump).output().unwrap();
-        serde_json::from_slice(&output.stdout)
-            .unwrap_or_else(|_| panic!("{}", String::from_utf8_lossy(&output.stderr)))
-    }
 }
 
 pub(crate) fn stdout_json(output: &Output) -> Value {
@@ -85,7 +76,7 @@ fn all_six_over(link: &str, persona: &str) {
             "{what}: {}",
             String::from_utf8_lossy(&output.stderr)
         );
-        let verdict = field.judged();
+        let verdict = field.vehicle.judged();
         assert_eq!(verdict["collisions"], 0, "{what}: {verdict}");
         assert!(verdict["min_clearance_m"].as_f64().unwrap() >= 4.99, "{what}: {verdict}");
         assert!(verdict["length_m"].as_f64().unwrap() <= 1.05 * exact, "{what}: {verdict}");

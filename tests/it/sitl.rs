@@ -20,7 +20,7 @@ pub(crate) const PERSONAS: [&str; 2] = ["ardupilot", "px4"];
 pub(crate) struct FakeVehicle {
     process: Child,
     control: BufReader<TcpStream>,
-    urls: Vec<String>,
+    pub(crate) urls: Vec<String>,
 }
 
 /// The Python that has pymavlink: `QUAV_PYTHON`, or the project's own environment.
@@ -94,6 +94,17 @@ impl FakeVehicle {
     /// Everything the vehicle holds.
     pub(crate) fn dump(&mut self) -> Value {
         self.control(&json!({"cmd": "dump"}))["dump"].take()
+    }
+
+    /// What it holds, by the measure of `judge.py`.
+    pub(crate) fn judged(&mut self) -> Value {
+        let mut dump = tempfile::NamedTempFile::new().unwrap();
+        write!(dump, "{}", self.dump()).unwrap();
+        let judge = Path::new(env!("CARGO_MANIFEST_DIR")).join("sitl/judge.py");
+        let mut command = Command::new(python());
+        let output = command.arg(judge).arg(dump.path()).stderr(Stdio::inherit()).output();
+        serde_json::from_slice(&output.unwrap().stdout)
+            .expect("a verdict; without one, the reason is on stderr above")
     }
 
     /// The items of one plan that the vehicle holds.

@@ -99,6 +99,36 @@ impl ParamValue {
 }
 message!(ParamValue, "PARAM_VALUE", id 22, crc 220, length 25);
 
+/// PARAM_SET (23): sets one parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ParamSet {
+    /// The four bytes of `param_value`, as in [`ParamValue`].
+    pub bits: u32,
+    /// Of whom.
+    pub target: Node,
+    /// Which one.
+    pub name: ParamName,
+    /// `MAV_PARAM_TYPE`.
+    pub kind: u8,
+}
+
+impl ParamSet {
+    fn encode(&self) -> [u8; 23] {
+        let target = [self.target.system.0, self.target.component.0];
+        joined(&[&self.bits.to_le_bytes(), &target, &self.name.0, &[self.kind]])
+    }
+
+    fn decode(fields: &Fields<'_>) -> Self {
+        Self {
+            bits: fields.u32(0),
+            target: fields.node(4),
+            name: ParamName::decode(fields, 6),
+            kind: fields.u8(22),
+        }
+    }
+}
+message!(ParamSet, "PARAM_SET", id 23, crc 168, length 23);
+
 /// PARAM_ERROR (345): a parameter cannot be had. New in 2025; older firmware keeps silent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ParamError {

@@ -82,8 +82,13 @@ fn the_other_messages_have_the_layout_of_the_dialect() {
         base_mode: 128 | 1,
         system_status: 4,
     });
-    let ack = CommandAck { command: 512, result: 3, target: TARGET };
-    agrees::<_, dialect::COMMAND_ACK_DATA>(ack);
+    let ack = CommandAck { command: 512, result: 5, progress: 40, target: TARGET };
+    let theirs: dialect::COMMAND_ACK_DATA = agrees(ack);
+    assert_eq!(theirs.progress, 40);
+    let long = CommandLong { param1: 148.0, command: 512, target: TARGET, confirmation: 2 };
+    let theirs: dialect::COMMAND_LONG_DATA = agrees(long);
+    assert_eq!((theirs.param1, theirs.confirmation), (148.0, 2));
+    agrees::<_, dialect::COMMAND_INT_DATA>(CommandInt(CommandLong { confirmation: 0, ..long }));
     let text = StatusText { severity: 4, text: [b'x'; 50], id: 5, chunk: 2 };
     agrees::<_, dialect::STATUSTEXT_DATA>(text);
     let plan_ids = [7, 8, 1 << 31];

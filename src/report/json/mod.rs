@@ -24,6 +24,7 @@ use super::run::Run;
 use super::stretch::{Stretch, stretches};
 use crate::geodesy::LatLon;
 use crate::mission::legs::number as item_number;
+use crate::qaoa::qpu::QpuUse;
 use crate::replan::{Replanned, Verdict};
 
 /// What `quavd plan --json` prints.
@@ -51,6 +52,9 @@ pub struct PlanDocument {
     pub legs: Vec<LegDocument>,
     /// What was used instead of what was asked for, and why.
     pub fallback: Option<String>,
+    /// What was used of a QPU; only with the ibm engine.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub qpu: Option<QpuUse>,
     /// What was assumed, odd, or is different now, a sentence each.
     pub warnings: Vec<String>,
     /// Where the time went.
@@ -103,6 +107,7 @@ impl PlanDocument {
             before: Some(before.into()),
             legs: stretches(result).iter().map(LegDocument::from).collect(),
             fallback: result.fallback(),
+            qpu: result.qpu.clone(),
             warnings: run.warnings.iter().chain(&before.warnings).cloned().chain(notes).collect(),
             time_ms: TimeDocument::new(run, Some(result)),
             settings: run.options.into(),
@@ -127,6 +132,7 @@ impl PlanDocument {
             before: before.map(BeforeDocument::from),
             legs: before.into_iter().flat_map(|before| &before.legs).map(unchanged).collect(),
             fallback: None,
+            qpu: None,
             warnings: run.warnings.iter().chain(odd).cloned().collect(),
             time_ms: TimeDocument::new(run, None),
             settings: run.options.into(),
