@@ -274,9 +274,12 @@ impl Placemark {
     }
 }
 
+/// A lowest and a highest altitude, metres.
+type LowHigh = (f64, f64);
+
 /// `lon,lat[,altitude]` tuples separated by white space: the positions, and their lowest and highest
 /// altitude where each of them has one.
-fn coordinates(text: &str) -> Result<(Vec<LatLon>, Option<(f64, f64)>), Problem> {
+fn coordinates(text: &str) -> Result<(Vec<LatLon>, Option<LowHigh>), Problem> {
     let tuple = |(index, tuple): (usize, &str)| {
         let numbers: Result<Vec<f64>, _> = tuple.split(',').map(str::parse).collect();
         numbers.map_err(|_| Problem::Value {
