@@ -4,6 +4,7 @@
 //! - [`altitudes`]: what the altitudes of the legs decide: what is flown over, which limits hold;
 //! - [`field`]: frames and airspaces, one for each zone that the mission's legs are in;
 //! - [`mod@judge`]: the verdict on any mission, leg by leg;
+//! - [`fewer`]: re-planning with a limit on the waypoints;
 //! - [`plan`]: re-planning with the judgement of its own result;
 //! - [`reason`]: why there is no plan, in words that name regions and legs.
 //!
@@ -11,6 +12,7 @@
 //! file and writing them back is done elsewhere.
 
 pub mod altitudes;
+pub mod fewer;
 pub mod field;
 pub mod judge;
 pub mod plan;
@@ -24,9 +26,10 @@ use crate::mission::{Autopilot, FlightContext, LoiterHabit, Mission};
 use crate::planner::Settings;
 
 pub use altitudes::Vertical;
+pub use fewer::{replan, replan_with};
 pub use field::{Field, FieldError};
 pub use judge::{LegVerdict, Verdict, fields, judge};
-pub use plan::{LegRecord, Progress, Replanned, Stage, replan, replan_with};
+pub use plan::{LegRecord, Progress, Replanned, Stage};
 pub use reason::ReplanError;
 
 /// What a mission is judged or planned with.
@@ -67,6 +70,8 @@ pub struct Options {
     pub zone: Option<Zone>,
     /// What several inclusions mean together.
     pub inclusion: InclusionRule,
+    /// Most waypoints to insert, in all.
+    pub most_waypoints: Option<usize>,
     /// How long planning may take; when that is over, the best clear path until then is used.
     pub deadline: Option<Duration>,
     /// How heights are compared with altitudes.

@@ -12,6 +12,7 @@ mod deadline;
 mod docs;
 mod fuzz;
 mod ibm_circuits;
+mod in_flight;
 mod limits;
 mod loaders;
 mod packaging;
