@@ -5,7 +5,7 @@
 //! - [`signing`]: the options that sign a link;
 //! - [`files`]: scenarios, missions and fences from files, results to files;
 //! - [`progress`]: what is shown while something runs; [`terminal`]: what the terminal can show;
-//! - [`run`], [`status`], [`plan`], [`check`], [`once`], [`compare`], [`qaoa`], [`ibm`]: one command
+//! - [`mod@run`], [`status`], [`plan`], [`check`], [`once`], [`compare`], [`qaoa`], [`ibm`]: one command
 //!   each;
 //! - [`generate`]: manual pages and completions;
 //! - [`memory`]: what the machine has left;
