@@ -50,14 +50,14 @@ ARDUPILOT = Persona(
     home_is_item_zero=True,
     serves_files=True,
     parameters={
-        "FENCE_ENABLE": (1, INT8), "FENCE_TYPE": (7, INT8), "FENCE_ACTION": (1, INT8),
+        "FENCE_ENABLE": (0, INT8), "FENCE_TYPE": (7, INT8), "FENCE_ACTION": (1, INT8),
         "FENCE_ALT_MAX": (100.0, REAL32), "FENCE_ALT_MIN": (-10.0, REAL32), "FENCE_RADIUS": (300.0, REAL32),
         "FENCE_MARGIN": (2.0, REAL32), "FENCE_OPTIONS": (1, mavlink.MAV_PARAM_TYPE_INT16),
         "FENCE_TOTAL": (0, INT8), "FENCE_AUTOENABLE": (0, INT8),
         "OA_TYPE": (0, INT8), "OA_MARGIN_MAX": (5.0, REAL32),
         "MIS_TOTAL": (0, mavlink.MAV_PARAM_TYPE_INT16), "MIS_OPTIONS": (0, mavlink.MAV_PARAM_TYPE_INT16),
         "RALLY_TOTAL": (0, INT8), "WPNAV_SPEED": (1000.0, REAL32), "WPNAV_RADIUS": (200.0, REAL32),
-        "RTL_ALT": (1500.0, REAL32), "SYSID_THISMAV": (1, mavlink.MAV_PARAM_TYPE_INT16),
+        "CIRCLE_RADIUS": (1000.0, REAL32), "RTL_ALT": (1500.0, REAL32), "SYSID_THISMAV": (1, mavlink.MAV_PARAM_TYPE_INT16),
     },
 )
 
@@ -83,6 +83,7 @@ PX4 = Persona(
     parameters={
         "GF_ACTION": (2, INT32), "GF_MAX_HOR_DIST": (0.0, REAL32), "GF_MAX_VER_DIST": (0.0, REAL32),
         "GF_SOURCE": (0, INT32), "GF_PREDICT": (0, INT32), "NAV_ACC_RAD": (10.0, REAL32),
+        "NAV_LOITER_RAD": (80.0, REAL32),
         "MIS_DIST_1WP": (10000.0, REAL32), "MPC_XY_CRUISE": (5.0, REAL32), "MAV_SYS_ID": (1, INT32),
     },
 )

@@ -19,6 +19,8 @@ const GRID: f64 = 1e-3;
 #[must_use]
 pub fn buffered(outline: &Outline, margin: f64) -> MultiPolygon {
     match outline {
+        // Not left to the overlay, which has no need to take nothing.
+        Outline::Solid(rings) if rings.is_empty() => MultiPolygon::new(Vec::new()),
         Outline::Solid(rings) => {
             let polygons = rings.iter().map(|ring| polygon(ring)).collect::<Vec<_>>();
             MultiPolygon::new(polygons).buffer_with_style(rounded(margin))

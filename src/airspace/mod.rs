@@ -15,4 +15,4 @@ pub mod outline;
 pub mod space;
 
 pub use outline::{AirspaceError, Outline, RegionProblem};
-pub use space::{Airspace, InclusionRule, RegionId};
+pub use space::{Airspace, RegionId};

@@ -279,7 +279,12 @@ mod tests {
     fn region(role: FenceRole, local: &[(f64, f64)]) -> FenceRegion {
         let frame = frame();
         let ring = local.iter().map(|&(x, y)| frame.to_position(Xy { x, y }).unwrap()).collect();
-        FenceRegion { role, shape: FenceShape::Polygon(ring), origin: "fence item 7".into() }
+        FenceRegion {
+            role,
+            shape: FenceShape::Polygon(ring),
+            heights: None,
+            origin: "fence item 7".into(),
+        }
     }
 
     fn solids(local: &[(f64, f64)]) -> (Vec<Vec<Xy>>, Option<String>) {
@@ -345,6 +350,7 @@ mod tests {
                     centre: LatLon::new(22.2, 113.5).unwrap(),
                     radius: Metres(radius),
                 },
+                heights: None,
                 origin: "circle".into(),
             };
             assert!(outline(&circle, &frame()).is_err(), "{radius}");

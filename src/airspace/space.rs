@@ -1,8 +1,7 @@
 //! The airspace of a leg: all regions as barriers, and the two questions a path asks of it, "how
 //! near does this segment come?" and "which region is it?".
 
-use std::fmt;
-use std::str::FromStr;
+use std::collections::BTreeSet;
 
 use geo::{Line, MultiPolygon, Polygon, unary_union};
 use rstar::primitives::{GeomWithData, Rectangle};
@@ -10,43 +9,12 @@ use rstar::{AABB, RTree};
 
 use super::barrier::{Barrier, BarrierIndex, BarrierShape};
 use super::outline::{AirspaceError, Outline, RegionProblem, contains, edges, outline};
-use crate::fence::{FenceRole, FenceSet};
+use crate::fence::{FenceRegion, FenceRole, FenceSet, InclusionRule};
 use crate::geodesy::{LocalFrame, Xy};
 
 /// A region's index in the [`FenceSet`] that the airspace was built from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct RegionId(pub u32);
-
-/// What several inclusion regions mean together.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum InclusionRule {
-    /// Inside all of them, as ArduPilot (without the union option) and PX4 do.
-    #[default]
-    All,
-    /// Inside at least one of them.
-    Any,
-}
-
-impl fmt::Display for InclusionRule {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::All => "all",
-            Self::Any => "any",
-        })
-    }
-}
-
-impl FromStr for InclusionRule {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "all" => Ok(Self::All),
-            "any" => Ok(Self::Any),
-            _ => Err(format!("'{text}' is neither all nor any")),
-        }
-    }
-}
 
 /// A boundary that a path may have to go round, with the forbidden side on the left of its
 /// edges (a counter-clockwise obstacle, or a clockwise inclusion).
@@ -76,8 +44,10 @@ pub struct Airspace {
     outlines: Vec<Outline>,
     barriers: BarrierIndex,
     solids: RTree<SolidBox>,
-    /// With [`InclusionRule::Any`]: the union of all inclusions, where there are any.
-    union: Option<MultiPolygon>,
+    /// With [`InclusionRule::Any`]: the union of the inclusions, where there are several, and the
+    /// first of them.
+    union: Option<(MultiPolygon, RegionId)>,
+    /// The inclusions that each have to be kept.
     zones: Vec<RegionId>,
     warnings: Vec<String>,
 }
@@ -92,9 +62,23 @@ impl Airspace {
         frame: &LocalFrame,
         rule: InclusionRule,
     ) -> Result<Self, AirspaceError> {
-        let mut outlines = Vec::with_capacity(fences.regions.len());
+        Self::with_limits(fences, &[], frame, rule)
+    }
+
+    /// The same with limits: inclusions that have to be kept besides the others, whatever the
+    /// rule for those is. Their ids follow on those of the fence set.
+    ///
+    /// # Errors
+    /// As [`Airspace::new`].
+    pub fn with_limits(
+        fences: &FenceSet,
+        limits: &[FenceRegion],
+        frame: &LocalFrame,
+        rule: InclusionRule,
+    ) -> Result<Self, AirspaceError> {
+        let mut outlines = Vec::with_capacity(fences.regions.len() + limits.len());
         let mut warnings = Vec::new();
-        for region in &fences.regions {
+        for region in fences.regions.iter().chain(limits) {
             let (shape, warning) = outline(region, frame)?;
             if rule == InclusionRule::Any
                 && warning.is_some()
@@ -106,12 +90,37 @@ impl Airspace {
             outlines.push(shape);
             warnings.extend(warning);
         }
-        let zones: Vec<RegionId> = regions(&outlines)
+        let mut zones: Vec<RegionId> = regions(&outlines)
             .filter(|(_, outline)| matches!(outline, Outline::Zone(_) | Outline::ZoneDisc { .. }))
             .map(|(id, _)| id)
             .collect();
-        let union = (rule == InclusionRule::Any && zones.len() > 1)
-            .then(|| unary_union(&zone_polygons(&outlines, &zones)));
+        let limits_from = zones.partition_point(|id| (id.0 as usize) < fences.regions.len());
+        let union = (rule == InclusionRule::Any && limits_from > 1).then(|| {
+            let joined: Vec<RegionId> = zones.drain(..limits_from).collect();
+            (unary_union(&zone_polygons(&outlines, &joined)), joined[0])
+        });
+        Ok(Self::assembled(outlines, union, zones, warnings))
+    }
+
+    /// The same airspace without some of its obstacles. All others keep their ids.
+    #[must_use]
+    pub fn without(&self, obstacles: &[RegionId]) -> Self {
+        let outline = |(id, outline): (RegionId, &Outline)| match outline {
+            Outline::Solid(_) | Outline::SolidDisc { .. } if obstacles.contains(&id) => {
+                Outline::Solid(Vec::new())
+            }
+            other => other.clone(),
+        };
+        let outlines = regions(&self.outlines).map(outline).collect();
+        Self::assembled(outlines, self.union.clone(), self.zones.clone(), self.warnings.clone())
+    }
+
+    fn assembled(
+        outlines: Vec<Outline>,
+        union: Option<(MultiPolygon, RegionId)>,
+        zones: Vec<RegionId>,
+        warnings: Vec<String>,
+    ) -> Self {
         let mut space = Self {
             barriers: BarrierIndex::new(Vec::new()),
             solids: RTree::bulk_load(solid_boxes(&outlines)),
@@ -135,7 +144,7 @@ impl Airspace {
             }
         }
         space.barriers = BarrierIndex::new(barriers);
-        Ok(space)
+        space
     }
 
     /// What was odd about the regions, a sentence each.
@@ -163,13 +172,13 @@ impl Airspace {
                 Outline::SolidDisc { centre, radius } => {
                     boundaries.push((id, Boundary::Disc { centre: *centre, radius: *radius }));
                 }
-                Outline::Zone(ring) if self.union.is_none() => {
+                Outline::Zone(ring) if self.zones.contains(&id) => {
                     boundaries.push((id, Boundary::Ring(ring.iter().rev().copied().collect())));
                 }
                 Outline::Zone(_) | Outline::ZoneDisc { .. } => {}
             }
         }
-        if let (Some(union), Some(&first)) = (&self.union, self.zones.first()) {
+        if let &Some((ref union, first)) = &self.union {
             // Outlines of the union belong to no single region: they are blamed on the first.
             for polygon in union {
                 for ring in std::iter::once(polygon.exterior()).chain(polygon.interiors()) {
@@ -229,7 +238,30 @@ impl Airspace {
     /// With [`InclusionRule::Any`], the union of several inclusions: inside it is allowed.
     #[must_use]
     pub fn union(&self) -> Option<&MultiPolygon> {
-        self.union.as_ref()
+        self.union.as_ref().map(|(union, _)| union)
+    }
+
+    /// The inclusions that each have to be kept, be there a union of others or not.
+    pub fn zones(&self) -> impl Iterator<Item = &Outline> {
+        self.zones.iter().map(|id| &self.outlines[id.0 as usize])
+    }
+
+    /// Every obstacle that comes nearer to a segment than `margin` metres.
+    #[must_use]
+    pub fn obstacles_near(&self, a: Xy, b: Xy, margin: f64) -> BTreeSet<RegionId> {
+        let near = self.barriers.within(Line::new(a, b), margin).map(|(_, barrier)| barrier.region);
+        let here = AABB::from_point([a.x, a.y]);
+        let around = self.solids.locate_in_envelope_intersecting(&here).filter_map(|entry| {
+            let (region, ring) = entry.data;
+            match &self.outlines[region.0 as usize] {
+                Outline::Solid(rings) => contains(&rings[ring], a).then_some(region),
+                _ => None,
+            }
+        });
+        let is_obstacle = |id: &RegionId| {
+            matches!(self.outlines[id.0 as usize], Outline::Solid(_) | Outline::SolidDisc { .. })
+        };
+        near.chain(around).filter(is_obstacle).collect()
     }
 
     /// The obstacles that are at least in part in a box, by any one point of each of their parts.
@@ -262,14 +294,12 @@ impl Airspace {
 
     fn nearest_wall(&self, a: Xy, b: Xy, at_most: f64, enough: f64) -> Option<(f64, RegionId)> {
         let mut nearest = self.barriers.nearest(Line::new(a, b), at_most, enough);
-        if self.union.is_none() {
-            for &region in &self.zones {
-                if let Outline::ZoneDisc { centre, radius } = self.outlines[region.0 as usize] {
-                    let reach = |p: Xy| (p.x - centre.x).hypot(p.y - centre.y);
-                    let distance = (radius - reach(a).max(reach(b))).max(0.0);
-                    if distance < nearest.map_or(at_most, |(best, _)| best) {
-                        nearest = Some((distance, region));
-                    }
+        for &region in &self.zones {
+            if let Outline::ZoneDisc { centre, radius } = self.outlines[region.0 as usize] {
+                let reach = |p: Xy| (p.x - centre.x).hypot(p.y - centre.y);
+                let distance = (radius - reach(a).max(reach(b))).max(0.0);
+                if distance < nearest.map_or(at_most, |(best, _)| best) {
+                    nearest = Some((distance, region));
                 }
             }
         }
@@ -287,12 +317,14 @@ impl Airspace {
                 return Some(region);
             }
         }
-        if let Some(union) = &self.union {
+        if let Some((union, first)) = &self.union {
             let inside = union.iter().any(|polygon| {
                 let within = |ring: &geo::LineString| contains(&ring.0[..ring.0.len() - 1], point);
                 within(polygon.exterior()) && !polygon.interiors().iter().any(within)
             });
-            return if inside { None } else { self.zones.first().copied() };
+            if !inside {
+                return Some(*first);
+            }
         }
         self.zones.iter().copied().find(|region| match &self.outlines[region.0 as usize] {
             Outline::Zone(ring) => !contains(ring, point),

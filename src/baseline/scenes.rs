@@ -1,7 +1,7 @@
 //! Airspaces for the tests of the baselines.
 
-use crate::airspace::{Airspace, InclusionRule};
-use crate::fence::{FenceRegion, FenceRole, FenceSet, FenceShape};
+use crate::airspace::Airspace;
+use crate::fence::{FenceRegion, FenceRole, FenceSet, FenceShape, InclusionRule};
 use crate::formats::read_scenario;
 use crate::geodesy::{LatLon, LocalFrame, Xy, Zone};
 use crate::planner::leg_space::LegSpace;
@@ -21,6 +21,7 @@ impl Scene {
         let obstacle = |corners: &[(f64, f64); 4]| FenceRegion {
             role: FenceRole::Exclusion,
             shape: FenceShape::Polygon(corners.iter().map(place).collect()),
+            heights: None,
             origin: "obstacle".into(),
         };
         let regions = obstacles.iter().map(obstacle).collect();

@@ -130,7 +130,12 @@ macro_rules! link_errors {
     )*};
 }
 
-link_errors!(DiscoveryError, LinkError, crate::link::OpenError);
+link_errors!(
+    DiscoveryError,
+    LinkError,
+    crate::link::OpenError,
+    crate::vehicle::parameter::ParameterError
+);
 
 impl From<TransferError> for CliError {
     fn from(error: TransferError) -> Self {

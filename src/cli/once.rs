@@ -13,13 +13,13 @@ use super::options::{PlanningArgs, VehicleArgs, as_qpu};
 use super::plan::{Delivered, Outcome, planned_scenario};
 use super::progress::Shown;
 use super::signing::SigningArgs;
-use crate::fence::FenceSet;
 use crate::fence::items::decode_fence;
+use crate::fence::{FenceSet, VehicleRules};
 use crate::formats::Scenario;
 use crate::geodesy::LatLon;
 use crate::ibm::qpu::IbmQpu;
 use crate::link::{Endpoint, Link, Signer, Transport};
-use crate::mission::{self, Mission, MissionItem, MissionType};
+use crate::mission::{self, LoiterHabit, Mission, MissionItem, MissionType};
 use crate::replan::{self, Input, Options, Replanned, replan_with};
 use crate::report::Report;
 use crate::stop::Stop;
@@ -146,7 +146,7 @@ async fn with_vehicle(
     let mut read = read(vehicle, store, &args.planning, held, shown).await?;
     let flight = if args.in_flight { in_flight(vehicle, &mut read)? } else { None };
     shown.warn(&read.scenario.warnings);
-    let options = args.planning.options();
+    let options = read.options(&args.planning);
     if read.scenario.mission.items.is_empty() {
         return Err(CliError::Usage(
             "the vehicle holds no mission; upload one with a ground station first".to_owned(),
@@ -249,6 +249,17 @@ pub(crate) struct Read {
     pub(crate) start: Option<LatLon>,
     pub(crate) rally: Vec<LatLon>,
     pub(crate) autopilot: mission::Autopilot,
+    /// What the vehicle's parameters say about its fence.
+    rules: VehicleRules,
+    loiter: LoiterHabit,
+}
+
+impl Read {
+    /// The options for planning for this vehicle.
+    pub(crate) fn options(&self, planning: &PlanningArgs) -> Options {
+        let inclusion = planning.safety.inclusion.0;
+        planning.options().with_rules(self.rules.clone(), inclusion, self.loiter)
+    }
 }
 
 /// The three plans of a vehicle, as downloaded.
@@ -298,13 +309,19 @@ pub(crate) async fn read(
     let decoded = decode_fence(&fence, None)?;
     let (mut fences, mut warnings) = (decoded.fences, fell_back);
     warnings.extend(decoded.warnings);
+    shown.doing("reading the vehicle's parameters");
+    let (rules, loiter) = vehicle.rules().await?;
+    if planning.safety.ignore_disabled_fence {
+        warnings.extend(rules.leave_out_disabled(&mut fences));
+    }
+    warnings.extend(rules.odd_inclusions(&fences, mission.home.map(|home| home.position)));
     files::add_fences(&mut fences, &mut warnings, &planning.safety)?;
     let places = rally_places(&rally)?;
     // The vehicle stands at home before it takes off; in flight its own place counts.
     let start = state.position.map(|at| at.position).or(mission.home.map(|home| home.position));
     let scenario = Scenario { mission, fences, rally, warnings, ..Scenario::default() };
     let autopilot = vehicle.autopilot().into();
-    Ok(Read { scenario, held, original, start, rally: places, autopilot })
+    Ok(Read { scenario, held, original, start, rally: places, autopilot, rules, loiter })
 }
 
 /// The places of rally points.

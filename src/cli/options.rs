@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::ibm::account::AccountArgs;
 use super::{CliError, memory};
-use crate::airspace::InclusionRule;
+use crate::fence::InclusionRule;
 use crate::geodesy::Zone;
 use crate::ibm::client::backends::BackendChoice;
 use crate::ibm::qpu::IbmQpu;
@@ -15,7 +15,7 @@ use crate::link::{ComponentId, Identity, SystemId};
 use crate::planner::{CandidateSource, QpuSettings, QpuTraining, Rounds, Settings};
 use crate::qaoa::qpu::Qpu;
 use crate::qaoa::{EngineChoice, EngineKind};
-use crate::replan::Options;
+use crate::replan::{Options, Vertical};
 use crate::units::Metres;
 use crate::vehicle::Search;
 
@@ -28,9 +28,22 @@ pub struct SafetyArgs {
     /// Zone of the projection: auto (of each leg), or EPSG:n (UTM or UPS).
     #[arg(long, default_value = "auto", value_parser = zone, value_name = "ZONE")]
     pub zone: ZoneChoice,
-    /// What several inclusion fences mean: inside all of them, or any.
-    #[arg(long, default_value_t = InclusionRule::All, value_name = "all|any")]
-    pub inclusion: InclusionRule,
+    /// What several inclusion fences mean: inside all of them, or any. auto: as the vehicle has
+    /// it (ArduPilot's FENCE_OPTIONS), all of them for files.
+    #[arg(long, default_value = "auto", value_parser = inclusion, value_name = "auto|all|any")]
+    pub inclusion: InclusionChoice,
+    /// Leave out areas of the vehicle's own fence that it has switched off (FENCE_ENABLE,
+    /// FENCE_TYPE, GF_ACTION); otherwise they count like all others.
+    #[arg(long)]
+    pub ignore_disabled_fence: bool,
+    /// Vertical distance to keep from an obstacle with a height, to be flown over or under it,
+    /// metres.
+    #[arg(long, default_value_t = 10.0, value_parser = vertical, value_name = "M")]
+    pub vertical_margin: f64,
+    /// The ground at any obstacle is at most this many metres above or below home. Only with this
+    /// are heights above ground compared with altitudes above home.
+    #[arg(long, value_parser = vertical, value_name = "M")]
+    pub ground_relief: Option<f64>,
     /// More fences from a file (.plan, waypoints, GeoJSON, KML, fence text); may be repeated.
     #[arg(long, value_name = "FILE")]
     pub fence: Vec<PathBuf>,
@@ -42,6 +55,21 @@ pub struct SafetyArgs {
 /// `auto` or a zone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ZoneChoice(pub Option<Zone>);
+
+/// `auto` or a rule.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct InclusionChoice(pub Option<InclusionRule>);
+
+fn inclusion(text: &str) -> Result<InclusionChoice, String> {
+    match text {
+        "auto" => Ok(InclusionChoice(None)),
+        text => text.parse().map(|rule| InclusionChoice(Some(rule))),
+    }
+}
+
+fn vertical(text: &str) -> Result<f64, String> {
+    number(text, 0.0, 10_000.0)
+}
 
 fn zone(text: &str) -> Result<ZoneChoice, String> {
     match text {
@@ -258,9 +286,12 @@ impl SafetyArgs {
         Options {
             settings,
             zone: self.zone.0,
-            inclusion: self.inclusion,
-            most_waypoints: None,
-            deadline: None,
+            inclusion: self.inclusion.0.unwrap_or_default(),
+            vertical: Vertical {
+                margin: Metres(self.vertical_margin),
+                ground_relief: self.ground_relief.map(Metres),
+            },
+            ..Options::default()
         }
     }
 }

@@ -256,7 +256,7 @@ async fn work(
     let read = read.map_err(|error| known(Answer::from_cli(error)))?;
     let load = began.elapsed();
 
-    let mut planning = options.planning.options();
+    let mut planning = read.options(&options.planning);
     let qpu = options.planning.qpu(options.vehicle.state_dir.as_ref());
     let qpu = qpu.map_err(|error| known(Answer::from_cli(error)))?;
     if qpu.is_some() {

@@ -126,7 +126,12 @@ pub fn decode_fence(
                 let origin = format!("{prefix}fence item {index}");
                 warn_of_group(item, &origin, &mut decoded.warnings);
                 let shape = FenceShape::Circle { centre, radius };
-                decoded.fences.regions.push(FenceRegion { role: role(item), shape, origin });
+                decoded.fences.regions.push(FenceRegion {
+                    role: role(item),
+                    shape,
+                    heights: None,
+                    origin,
+                });
                 index += 1;
             }
             Command::NAV_FENCE_POLYGON_VERTEX_INCLUSION
@@ -152,7 +157,12 @@ pub fn decode_fence(
                 let origin = format!("{prefix}fence items {index}-{}", index + count - 1);
                 warn_of_group(item, &origin, &mut decoded.warnings);
                 let shape = FenceShape::Polygon(distinct_ring(ring));
-                decoded.fences.regions.push(FenceRegion { role: role(item), shape, origin });
+                decoded.fences.regions.push(FenceRegion {
+                    role: role(item),
+                    shape,
+                    heights: None,
+                    origin,
+                });
                 index += count;
             }
             other => return Err(at(index)(FenceItemProblem::NotAFenceCommand(other))),

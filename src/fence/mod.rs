@@ -2,15 +2,20 @@
 //!
 //! A [`FenceSet`] is still geographic and unbuffered. Turning it into something a path can be
 //! tested against is [`crate::airspace`]'s work. [`items`] reads and writes the fence plan items that
-//! vehicles and files hold.
+//! vehicles and files hold; [`rules`] is what a vehicle's parameters say about its fence besides;
+//! [`height`] is how high a region reaches.
 
+pub mod height;
 pub mod items;
+pub mod rules;
 #[cfg(test)]
 pub(crate) mod samples;
 
+pub use height::{HeightRange, HeightReference};
 pub use items::{DecodedFence, FenceItemError, decode_fence, encode_fence};
+pub use rules::{InclusionRule, Limit, Limits, VehicleRules};
 
-use crate::geodesy::LatLon;
+use crate::geodesy::{LatLon, geodesic_distance};
 use crate::units::Metres;
 
 /// On which side of its edge a region may be flown in.
@@ -36,6 +41,28 @@ pub enum FenceShape {
     },
 }
 
+impl FenceShape {
+    /// Whether a position is inside, as the autopilots tell: by the even-odd rule in degrees, and by
+    /// the distance on the ground. For what is said about a region, not for judging a path.
+    #[must_use]
+    pub fn contains(&self, position: LatLon) -> bool {
+        match self {
+            Self::Circle { centre, radius } => geodesic_distance(*centre, position) < *radius,
+            Self::Polygon(ring) => {
+                let edges = ring.iter().zip(ring.iter().cycle().skip(1));
+                edges.fold(false, |inside, (a, b)| {
+                    let crosses = (a.lat() > position.lat()) != (b.lat() > position.lat())
+                        && position.lon()
+                            < (b.lon() - a.lon()) * (position.lat() - a.lat())
+                                / (b.lat() - a.lat())
+                                + a.lon();
+                    inside != crosses
+                })
+            }
+        }
+    }
+}
+
 /// One region, and where it came from so that a message can name it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FenceRegion {
@@ -43,6 +70,8 @@ pub struct FenceRegion {
     pub role: FenceRole,
     /// Its outline.
     pub shape: FenceShape,
+    /// How high it reaches; `None`: it counts at all altitudes.
+    pub heights: Option<HeightRange>,
     /// What to call it in a message, such as `fence items 4-9` or `city.geojson feature 3`.
     pub origin: String,
 }

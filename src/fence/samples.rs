@@ -25,7 +25,12 @@ fn shape() -> impl Strategy<Value = FenceShape> {
 
 fn region() -> impl Strategy<Value = FenceRegion> {
     let role = prop_oneof![Just(FenceRole::Inclusion), Just(FenceRole::Exclusion)];
-    (role, shape()).prop_map(|(role, shape)| FenceRegion { role, shape, origin: String::new() })
+    (role, shape()).prop_map(|(role, shape)| FenceRegion {
+        role,
+        shape,
+        heights: None,
+        origin: String::new(),
+    })
 }
 
 /// Any fence, with or without a return point.

@@ -1,6 +1,7 @@
 //! GeoJSON features and KML placemarks are the same thing in two syntaxes: a shape with
 //! properties. This file holds that common form; [`read`] makes a scenario of features
-//! ([`properties`] says what each is, [`order`] in which order they are flown), [`write`] the reverse.
+//! ([`properties`] says what each is, [`heights`] how high, [`order`] in which order they are flown),
+//! [`write`] the reverse.
 //!
 //! Properties that are read (in KML: `ExtendedData`):
 //!
@@ -11,6 +12,9 @@
 //! | `fence` | area | `inclusion` or `exclusion`; the same as `role` |
 //! | `inclusion` | area | `true` or `false`; the same again |
 //! | `radius` | point | metres: the point is a circle |
+//! | `height`, `max_height` | obstacle | its upper end, metres; the larger where both are given |
+//! | `min_height` | obstacle | its lower end, metres; without it, it stands on the ground |
+//! | `height_reference` | obstacle | what these are above: `ground` (the default) or `amsl` |
 //! | `seq` | point | place in the order of the route |
 //! | `altitude` | point | metres above home (default [`DEFAULT_ROUTE_ALTITUDE`]) |
 //! | `name` | all | what messages call it |
@@ -19,6 +23,7 @@
 //! `MAV_FRAME_GLOBAL_RELATIVE_ALT`. A point with `command`, `frame` and `params` is that mission
 //! item. A line with role `track` is a picture of the route and not read.
 
+mod heights;
 mod order;
 mod properties;
 mod read;

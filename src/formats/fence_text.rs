@@ -70,6 +70,7 @@ pub(super) fn read(name: &str, text: &str) -> Result<Scenario, Located> {
     let region = FenceRegion {
         role: FenceRole::Inclusion,
         shape: FenceShape::Polygon(distinct_ring(ring.to_vec())),
+        heights: None,
         origin: format!("{name} fence polygon"),
     };
     let fences = FenceSet { regions: vec![region], return_point };

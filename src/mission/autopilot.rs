@@ -11,3 +11,17 @@ pub enum Autopilot {
     #[default]
     Unknown,
 }
+
+impl Autopilot {
+    /// The number of repeats of a `DO_JUMP` that makes it always jump. ArduPilot has -1 for that
+    /// (`AP_MISSION_JUMP_REPEAT_FOREVER`); PX4 keeps 16 bits without a sign, and jumping 65,535
+    /// times takes longer than any battery lasts.
+    #[must_use]
+    pub fn always(self) -> Option<f32> {
+        match self {
+            Self::ArduPilot => Some(-1.0),
+            Self::Px4 => Some(65_535.0),
+            Self::Unknown => None,
+        }
+    }
+}

@@ -137,6 +137,25 @@ pub enum LoiterHabit {
     },
 }
 
+impl LoiterHabit {
+    /// The habit of a kind of vehicle (`MAV_TYPE`), with its own radii where they are known: of a
+    /// fixed wing's loiter, and of a multirotor's circle. A VTOL may do either; it is judged as a
+    /// fixed wing, whose circle is where a hovering vehicle stays, too.
+    #[must_use]
+    pub fn of(mav_type: u8, loiter: Option<Metres>, circle: Option<Metres>) -> Self {
+        match mav_type {
+            // FIXED_WING, VTOL_*
+            1 | 19..=25 => loiter.map_or(Self::Unknown, |radius| Self::Circle { radius }),
+            // QUADROTOR, COAXIAL, HELICOPTER, HEXAROTOR, OCTOROTOR, TRICOPTER, DODECAROTOR,
+            // DECAROTOR. PX4 has one radius for all vehicles.
+            2..=4 | 13..=15 | 29 | 35 => circle
+                .or(loiter)
+                .map_or(Self::Unknown, |circle_radius| Self::Hover { circle_radius }),
+            _ => Self::Unknown,
+        }
+    }
+}
+
 /// The radius of the circle around a loiter item's place, from the item and the vehicle's habit;
 /// zero for a vehicle that hovers there. The sign of the parameter is the direction only.
 ///
@@ -203,6 +222,18 @@ mod tests {
             31_004, 42_702, 42_703,
         ];
         assert_eq!(navigation, expected);
+    }
+
+    #[test]
+    fn the_kind_of_vehicle_says_how_it_loiters() {
+        let of = |kind| LoiterHabit::of(kind, Some(Metres(80.0)), Some(Metres(10.0)));
+        assert_eq!(of(2), LoiterHabit::Hover { circle_radius: Metres(10.0) });
+        assert_eq!(of(1), LoiterHabit::Circle { radius: Metres(80.0) });
+        assert_eq!(of(22), LoiterHabit::Circle { radius: Metres(80.0) });
+        assert_eq!(of(10), LoiterHabit::Unknown);
+        assert_eq!(LoiterHabit::of(1, None, Some(Metres(10.0))), LoiterHabit::Unknown);
+        let px4 = LoiterHabit::of(13, Some(Metres(80.0)), None);
+        assert_eq!(px4, LoiterHabit::Hover { circle_radius: Metres(80.0) });
     }
 
     #[test]

@@ -49,9 +49,11 @@ impl Command {
     /// The last of the navigation commands (`MAV_CMD_NAV_LAST`).
     pub const NAV_LAST: Self = Self(95);
     pub const CONDITION_DELAY: Self = Self(112);
+    pub const CONDITION_CHANGE_ALT: Self = Self(113);
     pub const CONDITION_DISTANCE: Self = Self(114);
     pub const DO_JUMP: Self = Self(177);
     pub const DO_SET_HOME: Self = Self(179);
+    pub const DO_CHANGE_ALTITUDE: Self = Self(186);
     pub const DO_RETURN_PATH_START: Self = Self(188);
     pub const DO_LAND_START: Self = Self(189);
     pub const DO_SET_ROI: Self = Self(201);

@@ -10,11 +10,13 @@ use super::Mission;
 use super::altitude::Altitude;
 use super::autopilot::Autopilot;
 use super::commands::{Destination, LoiterHabit, Role};
-use super::curve::{arc_bound, spline_bound};
+use super::curve::{arc_bound, bend_splines, spline_bound};
 use super::insertion::insertion_point;
 use super::item::{Command, MissionItem};
 use super::jumps::Jumps;
-use super::legs::{FlightContext, Leg, LegEnd, LegError, LegKind, LegShape, MissionLegs, ReturnTo};
+use super::legs::{
+    FlightContext, JumpInsertion, Leg, LegEnd, LegError, LegKind, LegShape, MissionLegs, ReturnTo,
+};
 use super::places::{places, radii, warning};
 use crate::geodesy::LatLon;
 use crate::units::Metres;
@@ -42,6 +44,8 @@ struct Itinerary<'a> {
     /// A `DO_SET_HOME` at a place that is not known was passed.
     home_lost: bool,
     landings: Vec<usize>,
+    /// Items whose places the mission can begin at.
+    first_places: Vec<usize>,
     steps: usize,
     legs: Vec<Leg>,
 }
@@ -67,6 +71,7 @@ pub(super) fn follow(
         known_homes: home.into_iter().map(bits).collect(),
         home_lost: false,
         landings: landings.collect(),
+        first_places: Vec::new(),
         steps: 0,
         legs: Vec::new(),
     };
@@ -76,6 +81,8 @@ pub(super) fn follow(
     itinerary.legs.clear();
     itinerary.walk_all(start)?;
     itinerary.stay_at_places_without_legs();
+    bend_splines(items, &mut itinerary.legs);
+    itinerary.mark_what_is_behind_jumps();
     warnings.extend(items.iter().enumerate().filter_map(warning));
     warnings.sort_by_key(|warning| warning.item());
     Ok(MissionLegs { legs: itinerary.legs, warnings })
@@ -143,23 +150,17 @@ impl Itinerary<'_> {
                     self.set_home(index, state.position);
                     open.push(next);
                 }
-                Role::Jump | Role::TagJump => {
-                    open.push(next);
-                    let jump = state.jump.or(Some(index));
-                    let destinations = self.jumps.destinations(index);
-                    open.extend(destinations.iter().map(|&index| State {
-                        index,
-                        jump,
-                        jumped: true,
-                        ..state
-                    }));
-                    self.count(destinations.len())?;
-                }
+                Role::Jump | Role::TagJump => self.jump(state, &mut open)?,
                 Role::PathNotGiven => {
                     return Err(LegError::PathNotGiven { item: index, command: item.command });
                 }
                 Role::Hold => {
-                    open.push(State { navigation: Some(index), jumped: false, ..next });
+                    open.push(State {
+                        navigation: Some(index),
+                        jumped: false,
+                        by_jump: None,
+                        ..next
+                    });
                 }
                 Role::Return => self.fly_back(state, &mut open)?,
                 Role::Place(Destination::Takeoff) => {
@@ -169,6 +170,35 @@ impl Itinerary<'_> {
             }
         }
         Ok(())
+    }
+
+    /// At a jump: on to the next item, and to where it may lead. One that is always taken goes
+    /// nowhere else; if it leads on, past some items, it is no branch of the way either.
+    fn jump(&mut self, state: State, open: &mut Vec<State>) -> Result<(), LegError> {
+        let index = state.index;
+        let item = &self.items[index];
+        let always =
+            self.context.autopilot.always().is_some_and(|always| {
+                item.command.role() == Role::Jump && item.params[1] == always
+            });
+        if !always {
+            open.push(State { index: index + 1, ..state });
+        }
+        let destinations = self.jumps.destinations(index);
+        for &target in destinations {
+            let onward = always && target > index;
+            let first = !state.jumped && state.landing.is_none() && target < self.items.len();
+            let by_jump = self
+                .context
+                .autopilot
+                .always()
+                .filter(|_| first && item.command.role() == Role::Jump)
+                .map(|always| JumpInsertion { jump: index, target, always });
+            let jump = if onward { state.jump } else { state.jump.or(Some(index)) };
+            open.push(State { index: target, jump, jumped: true, by_jump, ..state });
+        }
+        let branches = destinations.len();
+        self.count(branches)
     }
 
     fn count(&mut self, steps: usize) -> Result<(), LegError> {
@@ -218,6 +248,7 @@ impl Itinerary<'_> {
             index: index + 1,
             navigation: Some(index),
             jumped: false,
+            by_jump: None,
             position,
             altitude: self.altitude(index, Destination::Takeoff),
             circle: Metres::ZERO,
@@ -238,6 +269,9 @@ impl Itinerary<'_> {
         let circle = self.radii[index];
         let to = |position, altitude| LegEnd { item: Some(index), position, altitude, circle };
         if let Some(place) = self.places[index] {
+            if state.status == Status::Before && state.jump.is_none() {
+                self.first_places.push(index);
+            }
             if state.status == Status::Flying {
                 let from = self.leave(&state)?;
                 let to = to(place, self.altitude(index, destination));
@@ -246,7 +280,13 @@ impl Itinerary<'_> {
             }
             return Ok(None);
         }
-        let on = State { index: index + 1, navigation: Some(index), jumped: false, ..state };
+        let on = State {
+            index: index + 1,
+            navigation: Some(index),
+            jumped: false,
+            by_jump: None,
+            ..state
+        };
         match (state.status, destination) {
             (Status::Landed, _) => Ok(None),
             (Status::Before, _) => Ok(Some(on)),
@@ -272,7 +312,13 @@ impl Itinerary<'_> {
     fn fly_back(&mut self, state: State, open: &mut Vec<State>) -> Result<(), LegError> {
         let index = state.index;
         if state.status != Status::Flying {
-            let on = State { index: index + 1, navigation: Some(index), jumped: false, ..state };
+            let on = State {
+                index: index + 1,
+                navigation: Some(index),
+                jumped: false,
+                by_jump: None,
+                ..state
+            };
             open.push(on);
             return Ok(());
         }
@@ -341,11 +387,24 @@ impl Itinerary<'_> {
             },
             _ => None,
         };
+        let by_jump = match (kind, shape) {
+            (LegKind::Flown | LegKind::Return(_), LegShape::Straight) => state.by_jump,
+            _ => None,
+        };
         let kind = match (kind, state.landing) {
             (LegKind::Flown, Some(l)) => LegKind::Return(ReturnTo::LandingSequence(l.entry)),
             _ => kind,
         };
-        self.legs.push(Leg { from, to, kind, shape, jump: state.jump, insert_before });
+        self.legs.push(Leg {
+            from,
+            to,
+            kind,
+            shape,
+            jump: state.jump,
+            insert_before,
+            by_jump,
+            behind_jump: false,
+        });
         Ok(())
     }
 
@@ -377,17 +436,49 @@ impl Itinerary<'_> {
                 shape: LegShape::Straight,
                 jump: None,
                 insert_before: None,
+                by_jump: None,
+                behind_jump: false,
             });
+        }
+    }
+
+    /// Marks the legs that the way without jumps does not come to.
+    fn mark_what_is_behind_jumps(&mut self) {
+        let into: HashSet<usize> = self.legs.iter().filter_map(|leg| leg.to.item).collect();
+        let mut onward: HashMap<usize, Vec<usize>> = HashMap::new();
+        let mut open = self.first_places.clone();
+        for leg in self.legs.iter().filter(|leg| leg.jump.is_none()) {
+            match (leg.from.item, leg.to.item) {
+                // Where no leg leads to, a takeoff, a hold or nothing at all does.
+                (Some(from), to) => {
+                    onward.entry(from).or_default().extend(to);
+                    open.extend((!into.contains(&from)).then_some(from));
+                }
+                (None, to) => open.extend(to),
+            }
+        }
+        let mut reached = HashSet::new();
+        while let Some(item) = open.pop() {
+            if reached.insert(item) {
+                open.extend(onward.get(&item).into_iter().flatten());
+            }
+        }
+        for leg in &mut self.legs {
+            leg.behind_jump = leg.from.item.is_some_and(|from| !reached.contains(&from));
         }
     }
 
     fn shape(&self, destination: Destination, from: &LegEnd, to: &LegEnd) -> LegShape {
         let item = to.item.map(|item| &self.items[item]);
         match (destination, item) {
-            (Destination::Spline, _) => LegShape::Curved { within: spline_bound(from, to) },
-            (Destination::Arc, Some(item)) => {
-                LegShape::Curved { within: arc_bound(f64::from(item.params[0]), from, to) }
+            (Destination::Spline, _) => {
+                let any = spline_bound(from, to);
+                LegShape::Curved { within: any, overshoot: any }
             }
+            (Destination::Arc, Some(item)) => LegShape::Curved {
+                within: arc_bound(f64::from(item.params[0]), from, to),
+                overshoot: Some(Metres::ZERO),
+            },
             _ => LegShape::Straight,
         }
     }

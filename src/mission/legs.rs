@@ -84,9 +84,11 @@ pub enum LegShape {
     Straight,
     /// On a curve (spline or arc).
     Curved {
-        /// No point of the curve is further than this from the straight line; `None` where that
-        /// cannot be told.
+        /// No point of the curve is further than this from the straight line, seen from above;
+        /// `None` where that cannot be told.
         within: Option<Metres>,
+        /// No point is further than this above or below both ends; `None` likewise.
+        overshoot: Option<Metres>,
     },
 }
 
@@ -107,6 +109,26 @@ pub struct Leg {
     /// re-planned, only judged. Legs with the same number share the inserted waypoints: at most
     /// one of them can be re-planned, and the result decides about the others.
     pub insert_before: Option<usize>,
+    /// How waypoints can be put into a leg that is flown by a jump.
+    pub by_jump: Option<JumpInsertion>,
+    /// Whether only a jump leads to where it starts.
+    pub behind_jump: bool,
+}
+
+/// Waypoints for a leg that is flown by a jump stand before the jump's target. The jump goes to the
+/// first of them; another jump, always taken, leads whoever falls through past them:
+///
+/// > ..., `DO_JUMP` to the target, new waypoints, target, ..., `DO_JUMP` to the new waypoints, ...
+///
+/// So nothing but this jump flies them, and other jumps to the target still go there straight.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JumpInsertion {
+    /// The item that jumps.
+    pub jump: usize,
+    /// Where it jumps to.
+    pub target: usize,
+    /// The number of repeats (`param2`) that this autopilot takes for always.
+    pub always: f32,
 }
 
 /// What a message calls a leg.
@@ -133,7 +155,7 @@ impl Leg {
         let circles = self.from.circle.max(self.to.circle);
         match self.shape {
             LegShape::Straight => Some(circles),
-            LegShape::Curved { within } => within.map(|within| within + circles),
+            LegShape::Curved { within, .. } => within.map(|within| within + circles),
         }
     }
 }

@@ -4,7 +4,8 @@
 //! [`AltitudeProfile`]'s. A waypoint inserted before a returning item makes the way home explicit
 //! up to a last straight stretch. Every other item is kept bit for bit but for its sequence number
 //! and the sequence numbers that it holds: a `DO_JUMP` goes to the same item as before, not to the
-//! waypoints inserted before that item.
+//! waypoints inserted before that item. Unless these are for the leg that it flies itself: see
+//! [`JumpInsertion`].
 //!
 //! The result is not judged here. Its legs are found by [`super::legs()`] as those of any mission.
 
@@ -16,9 +17,9 @@ use geo::{Distance, Geodesic, Point};
 use super::Mission;
 use super::altitude::{AltitudeError, AltitudeProfile};
 use super::commands::Role;
-use super::item::{Command, MissionItem};
+use super::item::{Command, Frame, MissionItem};
 use super::jumps::index_in;
-use super::legs::{Leg, LegEnd, LegName, number};
+use super::legs::{JumpInsertion, Leg, LegEnd, LegName, number};
 use crate::geodesy::{LatLon, LatLonE7, PositionError};
 
 /// The most items a mission can have: `MISSION_COUNT` carries a `u16`.
@@ -57,6 +58,13 @@ pub enum SpliceNote {
         /// Its command.
         command: Command,
     },
+    /// A jump that now goes to new waypoints, and past them another that is always taken.
+    ByJump {
+        /// The jump.
+        jump: usize,
+        /// The item that it went to.
+        target: usize,
+    },
     /// An action behind a jump target: it now runs at the last inserted waypoint.
     Later {
         /// The item.
@@ -74,6 +82,13 @@ impl fmt::Display for SpliceNote {
                 "mission item {}: condition {} now counts up to the first inserted waypoint only",
                 number(item),
                 command.0
+            ),
+            Self::ByJump { jump, target } => write!(
+                f,
+                "mission item {}: the jump now goes over new waypoints before item {}; a jump that is \
+                 always taken leads all else past them",
+                number(jump),
+                number(target)
             ),
             Self::Later { item, command } => write!(
                 f,
@@ -95,8 +110,8 @@ pub enum SpliceError {
         /// The leg of the detour.
         leg: usize,
     },
-    /// A detour for a leg that can only be judged: one through a jump, to a takeoff, or along a
-    /// curve.
+    /// A detour for a leg that can only be judged: one to a takeoff, along a curve, or through
+    /// several jumps.
     #[error("the {0} cannot be re-planned, because no waypoint can be put into it alone")]
     Fixed(LegName),
     /// Two detours for legs that are flown through the same waypoints.
@@ -158,7 +173,7 @@ pub fn splice(mission: &Mission, legs: &[Leg], detours: &[Detour]) -> Result<Spl
         return Err(SpliceError::Sequence { item, seq });
     }
     let insertions = insertions(mission, legs, detours)?;
-    let total = items.len() + insertions.values().map(Vec::len).sum::<usize>();
+    let total = items.len() + insertions.values().map(Insertion::len).sum::<usize>();
     if total > ITEM_LIMIT {
         return Err(SpliceError::TooManyItems { items: total });
     }
@@ -166,10 +181,21 @@ pub fn splice(mission: &Mission, legs: &[Leg], detours: &[Detour]) -> Result<Spl
     let mut spliced = Vec::with_capacity(total);
     let mut inserted = Vec::with_capacity(total - items.len());
     let mut new_index_of_old = Vec::with_capacity(items.len());
+    // Jumps that do not go to the item that they went to: by their old index.
+    let mut retargeted = Vec::new();
+    // Jumps that lead past waypoints: their own index, and the old one of their target.
+    let mut past = Vec::new();
     for (index, item) in items.iter().enumerate() {
-        for waypoint in insertions.get(&index).into_iter().flatten() {
-            inserted.push(spliced.len());
-            spliced.push(*waypoint);
+        if let Some(Insertion { through, by_jump }) = insertions.get(&index) {
+            inserted.extend(spliced.len()..spliced.len() + through.len());
+            spliced.extend(through);
+            if let Some((by, waypoints)) = by_jump {
+                past.push((spliced.len(), index));
+                spliced.push(always_jump(by.always));
+                retargeted.push((by.jump, spliced.len()));
+                inserted.extend(spliced.len()..spliced.len() + waypoints.len());
+                spliced.extend(waypoints);
+            }
         }
         new_index_of_old.push(spliced.len());
         spliced.push(*item);
@@ -185,9 +211,61 @@ pub fn splice(mission: &Mission, legs: &[Leg], detours: &[Detour]) -> Result<Spl
             spliced[new_index_of_old[index]].params[parameter] = new as f32;
         }
     }
-    let notes = insertions.keys().flat_map(|&before| notes(items, before)).collect();
+    for (jump, waypoint) in retargeted {
+        spliced[new_index_of_old[jump]].params[0] = waypoint as f32;
+    }
+    for (jump, target) in past {
+        spliced[jump].params[0] = new_index_of_old[target] as f32;
+    }
+    let notes = insertions.iter().flat_map(|(&before, insertion)| insertion.notes(items, before));
+    let notes = notes.collect();
     let mission = Mission { home: mission.home, items: spliced };
     Ok(Spliced { mission, inserted, new_index_of_old, notes })
+}
+
+/// A jump that is always taken, its target still to be set.
+fn always_jump(always: f32) -> MissionItem {
+    MissionItem {
+        seq: 0,
+        frame: Frame::MISSION,
+        command: Command::DO_JUMP,
+        current: 0,
+        autocontinue: 1,
+        params: [0.0, always, 0.0, 0.0],
+        x: 0,
+        y: 0,
+        z: 0.0,
+    }
+}
+
+/// What is put before one item.
+#[derive(Debug, Default)]
+struct Insertion {
+    /// Waypoints on the way that falls through.
+    through: Vec<MissionItem>,
+    /// Waypoints that only a jump flies, after those.
+    by_jump: Option<(JumpInsertion, Vec<MissionItem>)>,
+}
+
+impl Insertion {
+    /// How many items it is.
+    fn len(&self) -> usize {
+        let by_jump = self.by_jump.as_ref().map_or(0, |(_, waypoints)| waypoints.len() + 1);
+        self.through.len() + by_jump
+    }
+
+    fn notes(&self, items: &[MissionItem], before: usize) -> Vec<SpliceNote> {
+        let through = (!self.through.is_empty()).then_some(before);
+        let by_jump = self.by_jump.as_ref().map(|(by, _)| by.jump);
+        let later = actions_behind(items, before);
+        // What holds back actions stands between the start of the stretch and its waypoints: before
+        // the end of it, or before the jump.
+        let conditions = through.into_iter().chain(by_jump);
+        let mut notes: Vec<_> = conditions.flat_map(|end| conditions_before(items, end)).collect();
+        notes.extend(by_jump.map(|jump| SpliceNote::ByJump { jump, target: before }));
+        notes.extend(later);
+        notes
+    }
 }
 
 /// Which parameter of an item holds the index of an item, and that index; the number of items
@@ -215,17 +293,26 @@ fn insertions(
     mission: &Mission,
     legs: &[Leg],
     detours: &[Detour],
-) -> Result<BTreeMap<usize, Vec<MissionItem>>, SpliceError> {
+) -> Result<BTreeMap<usize, Insertion>, SpliceError> {
     let moves_home = mission.items.iter().any(|item| item.command.role() == Role::SetHome);
     let home = mission.home.filter(|_| !moves_home).map(|home| home.altitude_amsl);
-    let mut insertions = BTreeMap::new();
+    let mut insertions: BTreeMap<usize, Insertion> = BTreeMap::new();
     for detour in detours.iter().filter(|detour| !detour.waypoints.is_empty()) {
         let leg = *legs.get(detour.leg).ok_or(SpliceError::NoSuchLeg { leg: detour.leg })?;
-        let before = leg.insert_before.ok_or(SpliceError::Fixed(leg.name()))?;
+        let before = match (leg.insert_before, leg.by_jump) {
+            (Some(before), _) => before,
+            (None, Some(by)) => by.target,
+            (None, None) => return Err(SpliceError::Fixed(leg.name())),
+        };
         let end = mission.items.get(before).ok_or(SpliceError::NoSuchLeg { leg: detour.leg })?;
         let waypoints = waypoints(&leg, end, &detour.waypoints, home)?;
-        if insertions.insert(before, waypoints).is_some() {
-            return Err(SpliceError::SharedWaypoints { item: before });
+        let insertion = insertions.entry(before).or_default();
+        match (leg.insert_before, leg.by_jump) {
+            (None, Some(by)) if insertion.by_jump.is_none() => {
+                insertion.by_jump = Some((by, waypoints));
+            }
+            (Some(_), _) if insertion.through.is_empty() => insertion.through = waypoints,
+            _ => return Err(SpliceError::SharedWaypoints { item: before }),
         }
     }
     Ok(insertions)
@@ -287,21 +374,25 @@ fn fractions(from: &LegEnd, places: &[LatLon], to: &LegEnd) -> Vec<f64> {
     passed.into_iter().take(places.len()).map(fraction).collect()
 }
 
-/// What is to be said about the items around an insertion: conditions before it, back to the last
-/// item of navigation, and actions behind it, up to the next.
-fn notes(items: &[MissionItem], before: usize) -> Vec<SpliceNote> {
+/// The conditions of a stretch that ends at an item: those back to the last item of navigation.
+fn conditions_before(items: &[MissionItem], end: usize) -> Vec<SpliceNote> {
     let role = |index: &usize| items[*index].command.role();
-    let first = (0..before).rev().find(|i| role(i).is_navigation()).map_or(0, |i| i + 1);
-    let command = |item: usize| items[item].command;
-    let conditions = (first..before)
+    let first = (0..end).rev().find(|i| role(i).is_navigation()).map_or(0, |i| i + 1);
+    (first..end)
         .filter(|index| role(index) == Role::Condition)
-        .map(|item| SpliceNote::Condition { item, command: command(item) });
-    let held = |index: &usize| command(*index) == Command::CONDITION_DISTANCE;
-    let actions = (before..items.len())
+        .map(|item| SpliceNote::Condition { item, command: items[item].command })
+        .collect()
+}
+
+/// The actions behind an insertion, up to the next item of navigation.
+fn actions_behind(items: &[MissionItem], before: usize) -> Vec<SpliceNote> {
+    let role = |index: &usize| items[*index].command.role();
+    let held = |index: &usize| items[*index].command == Command::CONDITION_DISTANCE;
+    (before..items.len())
         .take_while(|index| !role(index).is_navigation() && !held(index))
         .filter(|index| matches!(role(index), Role::Action | Role::Condition | Role::SetHome))
-        .map(|item| SpliceNote::Later { item, command: command(item) });
-    conditions.chain(actions).collect()
+        .map(|item| SpliceNote::Later { item, command: items[item].command })
+        .collect()
 }
 
 #[cfg(test)]

@@ -80,19 +80,19 @@ pub(super) fn bits(items: &[MissionItem]) -> Vec<([u32; 5], [i64; 7])> {
 }
 
 /// One stop of an executed mission.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Stop {
     /// The item of navigation.
     pub(super) item: usize,
-    /// Whether a jump was taken since the stop before.
-    pub(super) jumped: bool,
+    /// The jumps that were taken since the stop before.
+    pub(super) jumps: Vec<usize>,
 }
 
 /// Executes a mission the way an autopilot does: one item after the other, jumps while they have
-/// repeats left. Ends after `limit` stops.
+/// repeats left, or for ever where these are -1. Ends after `limit` stops.
 pub(super) fn execute(items: &[MissionItem], limit: usize) -> Vec<Stop> {
     let mut repeats: Vec<f32> = items.iter().map(|item| item.params[1]).collect();
-    let (mut stops, mut counter, mut jumped, mut steps) = (Vec::new(), 0, false, 0);
+    let (mut stops, mut counter, mut jumps, mut steps) = (Vec::new(), 0, Vec::new(), 0);
     while let Some(item) = items.get(counter) {
         steps += 1;
         if stops.len() >= limit || steps > 100 * limit {
@@ -107,16 +107,18 @@ pub(super) fn execute(items: &[MissionItem], limit: usize) -> Vec<Stop> {
             _ => None,
         };
         match target {
-            Some(target) if repeats[counter] > 0.0 => {
-                repeats[counter] -= 1.0;
-                (counter, jumped) = (target, true);
+            Some(target) if repeats[counter] > 0.0 || repeats[counter] == -1.0 => {
+                if repeats[counter] > 0.0 {
+                    repeats[counter] -= 1.0;
+                }
+                jumps.push(counter);
+                counter = target;
                 continue;
             }
             _ => {}
         }
         if number <= 95 && number != 80 {
-            stops.push(Stop { item: counter, jumped });
-            jumped = false;
+            stops.push(Stop { item: counter, jumps: std::mem::take(&mut jumps) });
         }
         counter += 1;
     }

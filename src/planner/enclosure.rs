@@ -46,12 +46,9 @@ pub fn enclosure(space: &LegSpace<'_>, start: Xy, goal: Xy) -> Option<Enclosure>
     let mut room = surroundings(&forbidden, start, goal);
     if let Some(union) = space.airspace().union() {
         room = room.intersection(&shrunk_union(union, margin));
-    } else {
-        for outline in outlines {
-            if matches!(outline, Outline::Zone(_) | Outline::ZoneDisc { .. }) {
-                room = room.intersection(&buffered(outline, margin));
-            }
-        }
+    }
+    for zone in space.airspace().zones() {
+        room = room.intersection(&buffered(zone, margin));
     }
     let free = room.difference(&forbidden);
     let part_of = |point: Xy| free.iter().position(|part| part.intersects(&Point::from(point)));

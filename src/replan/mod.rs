@@ -1,6 +1,7 @@
 //! A whole mission: which legs are not clear, a plan for each of them, the spliced mission, and
 //! the judgement of what would really be flown.
 //!
+//! - [`altitudes`]: what the altitudes of the legs decide: what is flown over, which limits hold;
 //! - [`field`]: frames and airspaces, one for each zone that the mission's legs are in;
 //! - [`mod@judge`]: the verdict on any mission, leg by leg;
 //! - [`fewer`]: re-planning with a limit on the waypoints;
@@ -10,6 +11,7 @@
 //! Pure: missions and fences in, a mission and its record out. Reading them from a vehicle or a
 //! file and writing them back is done elsewhere.
 
+pub mod altitudes;
 pub mod fewer;
 pub mod field;
 pub mod judge;
@@ -18,12 +20,12 @@ pub mod reason;
 
 use std::time::Duration;
 
-use crate::airspace::InclusionRule;
-use crate::fence::FenceSet;
+use crate::fence::{FenceSet, InclusionRule, VehicleRules};
 use crate::geodesy::{LatLon, Zone};
 use crate::mission::{Autopilot, FlightContext, LoiterHabit, Mission};
 use crate::planner::Settings;
 
+pub use altitudes::Vertical;
 pub use fewer::{replan, replan_with};
 pub use field::{Field, FieldError};
 pub use judge::{LegVerdict, Verdict, fields, judge};
@@ -46,13 +48,8 @@ pub struct Input<'a> {
 }
 
 impl<'a> Input<'a> {
-    fn context(&self) -> FlightContext<'a> {
-        FlightContext {
-            start: self.start,
-            rally: self.rally,
-            autopilot: self.autopilot,
-            loiter: LoiterHabit::default(),
-        }
+    fn context(&self, loiter: LoiterHabit) -> FlightContext<'a> {
+        FlightContext { start: self.start, rally: self.rally, autopilot: self.autopilot, loiter }
     }
 
     /// The same with another mission.
@@ -77,4 +74,35 @@ pub struct Options {
     pub most_waypoints: Option<usize>,
     /// How long planning may take; when that is over, the best clear path until then is used.
     pub deadline: Option<Duration>,
+    /// How heights are compared with altitudes.
+    pub vertical: Vertical,
+    /// What the vehicle's parameters say; empty without a vehicle.
+    pub rules: VehicleRules,
+    /// How the vehicle loiters.
+    pub loiter: LoiterHabit,
+}
+
+impl Options {
+    /// The same for a vehicle with these rules. `inclusion` is what was asked for, where anything
+    /// was: it counts more than the vehicle's. The buffer is at least the vehicle's own margin.
+    #[must_use]
+    pub fn with_rules(
+        mut self,
+        rules: VehicleRules,
+        inclusion: Option<InclusionRule>,
+        loiter: LoiterHabit,
+    ) -> Self {
+        self.inclusion = inclusion.or(rules.inclusion).unwrap_or_default();
+        let buffer = self.settings.buffer;
+        self.rules = rules;
+        self.loiter = loiter;
+        if let Some(margin) = self.rules.margin.filter(|margin| *margin > buffer) {
+            self.settings.buffer = margin;
+            self.rules.applied.push(format!(
+                "the vehicle's FENCE_MARGIN of {} m is kept instead of the smaller buffer of {} m",
+                margin.0, buffer.0
+            ));
+        }
+        self
+    }
 }

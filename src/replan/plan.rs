@@ -4,10 +4,11 @@ use std::collections::BTreeSet;
 use std::fmt;
 
 use super::field::{Field, Fields};
-use super::judge::{Verdict, can_be_replanned, judge, verdict};
+use super::judge::{LegVerdict, Verdict, can_be_replanned, judge, verdict};
 use super::reason::ReplanError;
 use super::{Input, Options};
 use crate::geodesy::{LatLonE7, Xy, Zone};
+use crate::mission::legs::{LegKind, LegShape};
 use crate::mission::splice::SpliceNote;
 use crate::mission::{Detour, Leg, Mission, legs, splice};
 use crate::planner::candidates::Candidate;
@@ -150,9 +151,9 @@ pub(super) fn replan_as_set(
     stop: &Stop,
     watch: &mut impl FnMut(Progress<'_>),
 ) -> Result<Replanned, ReplanError> {
-    let flown = legs(input.mission, &input.context())?;
-    let fields = Fields::new(&flown.legs, input.fences, options)?;
-    let before = verdict(&flown, &fields, input, options)?;
+    let flown = legs(input.mission, &input.context(options.loiter))?;
+    let fields = Fields::new(&flown.legs, input, options)?;
+    let before = verdict(&flown, &fields, options)?;
     let blocked = legs_to_replan(&before)?;
 
     let mut planner = LegPlanner::new(options.settings.clone());
@@ -164,21 +165,21 @@ pub(super) fn replan_as_set(
         let legs = blocked.len();
         let mut tell = |stage: Stage<'_>| watch(Progress { leg: k + 1, legs, name: &name, stage });
         tell(Stage::Candidates);
-        let (zone, zoned) = fields
-            .of(leg.from.position, leg.to.position)
+        let view = fields
+            .of(leg)
             .ok_or_else(|| ReplanError::unjudged(leg, "its zone was not prepared"))?;
         let request = LegRequest {
             from: leg.from.position,
             to: leg.to.position,
-            from_reach: leg.from.circle.0 * zoned.spread,
-            to_reach: leg.to.circle.0 * zoned.spread,
+            from_reach: leg.from.circle.0 * view.spread,
+            to_reach: leg.to.circle.0 * view.spread,
         };
-        let space = zoned.leg_space(options.settings.buffer.0, request.from, request.to);
+        let space = view.leg_space(options.settings.buffer.0, request.from, request.to);
         let mut number = 0;
         let outcome = planner
             .plan_with(
                 &request,
-                &zoned.frame,
+                view.frame,
                 &space,
                 (stop, legs - k),
                 // A reborrow that ends with the leg.
@@ -191,14 +192,16 @@ pub(super) fn replan_as_set(
                     tell(Stage::Round { number, round });
                 },
             )
-            .map_err(|error| ReplanError::from_plan(error, leg, input.fences))?;
+            .map_err(|error| {
+                ReplanError::from_plan(error, leg, &|region| fields.name(region).to_owned())
+            })?;
         tell(Stage::Planned);
         if let LegOutcome::Replanned(plan) = outcome {
             let LegPlan { finished, candidates, rounds, cut_short, fallback, times } = *plan;
             detours.push(Detour { leg: index, waypoints: finished.waypoints.clone() });
             records.push(LegRecord {
                 leg: *leg,
-                zone,
+                zone: view.zone,
                 waypoints: finished.waypoints,
                 points: finished.points,
                 candidates,
@@ -212,9 +215,8 @@ pub(super) fn replan_as_set(
 
     let spliced = splice(input.mission, &flown.legs, &detours)?;
     let after = judge(&input.with_mission(&spliced.mission), options)?;
-    if let Some(bad) = after.legs.iter().find(|leg| leg.blocker.is_some()) {
-        let region = bad.blocker.as_ref().map_or_else(String::new, |(region, _)| region.clone());
-        return Err(ReplanError::NotVerified { leg: bad.leg.name().to_string(), region });
+    if let Some(bad) = after.legs.iter().find(|leg| !leg.is_clear()) {
+        return Err(not_verified(bad));
     }
     Ok(Replanned {
         mission: spliced.mission,
@@ -228,19 +230,62 @@ pub(super) fn replan_as_set(
     })
 }
 
+/// Why a leg cannot be re-planned, and what to do.
+fn why_fixed(leg: &Leg) -> &'static str {
+    match (leg.kind, leg.shape) {
+        (_, LegShape::Curved { .. }) => {
+            "waypoints would bend the curve; make its end a plain waypoint (NAV_WAYPOINT), which can \
+             be re-planned, or move it"
+        }
+        (LegKind::Stay, _) => "it is no stretch that could go round it; move it, or the fence",
+        (LegKind::Takeoff, _) => "nothing can be flown before a takeoff; move it, or the fence",
+        _ if leg.jump.is_some() => {
+            "waypoints for a jump would be flown without it, too; let the jump go to waypoints that \
+             lead round it, or move its ends or the fence"
+        }
+        _ => "no waypoint can be put into it; move its ends or the fence",
+    }
+}
+
+/// Why the new mission does not pass.
+fn not_verified(bad: &LegVerdict) -> ReplanError {
+    let leg = bad.leg.name().to_string();
+    let region = bad.blocker.as_ref().map_or_else(String::new, |(region, _)| region.clone());
+    match (&bad.limit, bad.leg.shape) {
+        (Some(finding), _) => ReplanError::Altitude { leg, why: finding.to_string() },
+        // Its curve depends on the legs before and after it.
+        (None, LegShape::Curved { .. }) => {
+            let why = "waypoints in the leg before or after it bend it that way; make it straight \
+                       (NAV_WAYPOINT), or move it";
+            ReplanError::Fixed { leg, region, why: why.to_owned() }
+        }
+        // Several jumps to one place, or jumps behind each other.
+        _ if bad.leg.jump.is_some() => {
+            let why = why_fixed(&bad.leg).to_owned();
+            ReplanError::Fixed { leg, region, why }
+        }
+        _ => ReplanError::NotVerified { leg, region },
+    }
+}
+
 /// The legs that are not clear, in order; one of those that share their waypoints.
 fn legs_to_replan(before: &Verdict) -> Result<Vec<usize>, ReplanError> {
     let mut taken = BTreeSet::new();
     let mut blocked = Vec::new();
     for (index, verdict) in before.legs.iter().enumerate() {
+        if let Some(finding) = &verdict.limit {
+            let leg = verdict.leg.name().to_string();
+            return Err(ReplanError::Altitude { leg, why: finding.to_string() });
+        }
         let Some((region, _)) = &verdict.blocker else { continue };
         if !can_be_replanned(&verdict.leg) {
-            let why = "no waypoint can be put into it; move its ends or the fence".to_owned();
+            let why = why_fixed(&verdict.leg).to_owned();
             let (leg, region) = (verdict.leg.name().to_string(), region.clone());
             return Err(ReplanError::Fixed { leg, region, why });
         }
         // The others that share the waypoints are decided by the judgement of the result.
-        if taken.insert(verdict.leg.insert_before) {
+        let leg = &verdict.leg;
+        if taken.insert((leg.insert_before, leg.by_jump.map(|by| by.target))) {
             blocked.push(index);
         }
     }

@@ -1,7 +1,7 @@
 //! Why there is no plan, in words that name the leg, the regions, and what to do next.
 
 use super::field::FieldError;
-use crate::fence::FenceSet;
+use crate::airspace::RegionId;
 use crate::geodesy::ProjectionError;
 use crate::mission::{Leg, LegError, SpliceError};
 use crate::planner::PlanError;
@@ -49,6 +49,22 @@ pub enum ReplanError {
         /// The region's name.
         region: String,
         /// Why it cannot be re-planned, and what to do.
+        why: String,
+    },
+    /// A leg breaks an altitude limit, or cannot be judged by one. Waypoints are no help.
+    #[error("the {leg} {why}")]
+    Altitude {
+        /// The leg's name.
+        leg: String,
+        /// Which limit, and what to do.
+        why: String,
+    },
+    /// A limit of the vehicle cannot be judged for this mission.
+    #[error("{limit} cannot be judged: {why}")]
+    Limit {
+        /// The limit.
+        limit: String,
+        /// Why, and what to do.
         why: String,
     },
     /// The waypoints cannot be put into the mission.
@@ -115,6 +131,8 @@ impl ReplanError {
                 | Self::NotFound { .. }
                 | Self::DeadlinePassed { .. }
                 | Self::Fixed { .. }
+                | Self::Altitude { .. }
+                | Self::Limit { .. }
                 | Self::Splice(_)
                 | Self::NotVerified { .. }
                 | Self::TooManyWaypoints { .. }
@@ -132,10 +150,12 @@ impl ReplanError {
     }
 
     /// A planner's error about a leg, with regions by their names.
-    pub(super) fn from_plan(error: PlanError, leg: &Leg, fences: &FenceSet) -> Self {
-        let name = |region: &crate::airspace::RegionId| {
-            fences.regions.get(region.0 as usize).map_or("a fence", |r| r.origin.as_str())
-        };
+    pub(super) fn from_plan(
+        error: PlanError,
+        leg: &Leg,
+        region_name: &dyn Fn(RegionId) -> String,
+    ) -> Self {
+        let name = |region: &RegionId| region_name(*region);
         let leg = leg.name().to_string();
         let end = |goal: bool| if goal { "its end" } else { "its start" };
         match error {
@@ -149,7 +169,7 @@ impl ReplanError {
                 Self::Infeasible { leg, why: format!("{where_}; move it, or lower --buffer") }
             }
             PlanError::Infeasible { goal, regions } => {
-                let names: Vec<&str> = regions.iter().map(name).collect();
+                let names: Vec<String> = regions.iter().map(name).collect();
                 let why = format!(
                     "{} is shut in by {}; open the fence, or lower --buffer",
                     end(goal),

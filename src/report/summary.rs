@@ -56,6 +56,7 @@ pub fn plan_summary(result: &Replanned, run: &Run<'_>) -> String {
         leg_table(result).push_to(&mut out);
     }
     let notes: Vec<String> = result.notes.iter().map(ToString::to_string).collect();
+    heights(&mut out, before);
     if let Some(used) = &result.qpu {
         out.push('\n');
         push_wrapped(&mut out, &qpu_use(used), 4);
@@ -63,6 +64,25 @@ pub fn plan_summary(result: &Replanned, run: &Run<'_>) -> String {
     let fallback = result.fallback();
     remarks(&mut out, fallback, run, before.warnings.iter().chain(&notes));
     out
+}
+
+/// The legs that are flown over or under something.
+fn heights(out: &mut String, verdict: &Verdict) {
+    /// Obstacles named per leg.
+    const NAMED: usize = 3;
+    for (k, leg) in verdict.legs.iter().filter(|leg| !leg.passed.is_empty()).enumerate() {
+        if k == 0 {
+            out.push('\n');
+        }
+        let named = leg.passed.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
+        let more = match leg.passed.len().saturating_sub(NAMED) {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        let name = leg.leg.name();
+        let clear = format!("The {name} is clear of {named}{more} by its altitude.");
+        push_wrapped(out, &clear, 4);
+    }
 }
 
 /// What was used of a QPU.
@@ -113,9 +133,8 @@ fn time(record: &LegRecord) -> String {
 pub fn check_summary(verdict: &Verdict, run: &Run<'_>) -> String {
     let buffer = unbroken(run.options.settings.buffer);
     let legs = verdict.legs.len();
-    let too_near: Vec<&LegVerdict> =
-        verdict.legs.iter().filter(|leg| leg.blocker.is_some()).collect();
-    let collides = |leg: &&&LegVerdict| matches!(leg.blocker, Some((_, true)));
+    let too_near: Vec<&LegVerdict> = verdict.legs.iter().filter(|leg| !leg.is_clear()).collect();
+    let collides = |leg: &&&LegVerdict| leg.collides();
     let colliding = too_near.iter().filter(collides).count();
     let mut out = String::new();
     let headline = if too_near.is_empty() {
@@ -147,6 +166,7 @@ pub fn check_summary(verdict: &Verdict, run: &Run<'_>) -> String {
     for leg in too_near {
         push_wrapped(&mut out, &finding(leg), 4);
     }
+    heights(&mut out, verdict);
     remarks(&mut out, None, run, &verdict.warnings);
     out
 }
@@ -159,6 +179,9 @@ fn remarks<'a>(
     warnings: impl IntoIterator<Item = &'a String>,
 ) {
     let mut remarks = Vec::new();
+    let rules = &run.options.rules;
+    remarks.extend(rules.applied.iter().map(|text| format!("vehicle fence: {text}")));
+    remarks.extend(rules.missing.iter().map(|text| format!("warning: vehicle fence: {text}")));
     remarks.extend(fallback.map(|fallback| format!("fallback: {fallback}")));
     remarks.extend(run.warnings.iter().chain(warnings).map(|text| format!("warning: {text}")));
     if !remarks.is_empty() {

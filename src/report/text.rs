@@ -117,6 +117,9 @@ pub(crate) fn leg_label(leg: &Leg) -> String {
 /// What is wrong with a leg, as a sentence.
 pub(super) fn finding(verdict: &LegVerdict) -> String {
     let name = verdict.leg.name();
+    if let Some(limit) = &verdict.limit {
+        return format!("The {name} {limit}.");
+    }
     match &verdict.blocker {
         None => format!("The {name} is clear."),
         Some((region, true)) => format!("The {name} meets {region}."),

@@ -156,7 +156,10 @@ async fn count(exchange: &mut Exchange<'_>) -> Result<(u16, u32), Setback> {
             {
                 return Err(error.into());
             }
-            return Err(exchange.no_answer(Awaited::Count, patience.waited()).into());
+            // On a line that loses a third each way, seven questions in a row go unanswered once in a
+            // hundred times: while the vehicle is heard that is no reason to give up.
+            let error = exchange.no_answer(Awaited::Count, patience.waited());
+            return Err(Setback::Again(error));
         }
     }
 }

@@ -16,6 +16,7 @@ pub mod numbering;
 pub mod parameter;
 pub mod readback;
 pub mod replace;
+pub mod rules;
 pub mod state;
 mod text;
 pub mod timing;

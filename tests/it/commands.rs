@@ -29,24 +29,24 @@ fn example(name: &str) -> String {
     root(&format!("fence_examples/{name}.plan")).to_string_lossy().into_owned()
 }
 
-fn quavd(arguments: &[&str]) -> Output {
+pub(crate) fn quavd(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_quavd")).args(arguments).output().unwrap()
 }
 
 /// A vehicle with a scenario, and a directory for records.
-struct Field {
-    vehicle: FakeVehicle,
+pub(crate) struct Field {
+    pub(crate) vehicle: FakeVehicle,
     state: TempDir,
 }
 
 impl Field {
-    fn new(link: &str, persona: &str, scenario: &str) -> Self {
+    pub(crate) fn new(link: &str, persona: &str, scenario: &str) -> Self {
         let plan = example(scenario);
         let vehicle = FakeVehicle::start_on(link, &["--persona", persona, "--mission", &plan]);
         Self { vehicle, state: tempfile::tempdir().unwrap() }
     }
 
-    fn once(&self, more: &[&str]) -> Output {
+    pub(crate) fn once(&self, more: &[&str]) -> Output {
         let url = self.vehicle.endpoint().to_string();
         let state = self.state.path().to_string_lossy().into_owned();
         let mut arguments = vec!["once", "--connect", &url, "--state-dir", &state, "--system", "1"];
@@ -55,7 +55,7 @@ impl Field {
     }
 }
 
-fn stdout_json(output: &Output) -> Value {
+pub(crate) fn stdout_json(output: &Output) -> Value {
     serde_json::from_slice(&output.stdout).unwrap_or_else(|error| {
         panic!(
             "{error}: {}\n{}",

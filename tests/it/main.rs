@@ -13,6 +13,7 @@ mod docs;
 mod fuzz;
 mod ibm_circuits;
 mod in_flight;
+mod limits;
 mod loaders;
 mod packaging;
 mod page;

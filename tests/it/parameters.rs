@@ -9,8 +9,8 @@ async fn integers_and_reals_of_both_autopilots_are_read_also_on_a_lossy_link() {
     for (persona, names, expected) in [
         (
             "ardupilot",
-            ["FENCE_ENABLE", "FENCE_ALT_MIN", "FENCE_OPTIONS", "GF_ACTION"],
-            [Some(1.0), Some(-10.0), Some(1.0), None],
+            ["FENCE_TYPE", "FENCE_ALT_MIN", "FENCE_OPTIONS", "GF_ACTION"],
+            [Some(7.0), Some(-10.0), Some(1.0), None],
         ),
         (
             "px4",

@@ -14,7 +14,8 @@ mod scene;
 
 use std::time::{Duration, Instant};
 
-use quav::airspace::{Airspace, InclusionRule};
+use quav::airspace::Airspace;
+use quav::fence::InclusionRule;
 use quav::geodesy::{LatLonE7, LocalFrame, Zone};
 use quav::planner::leg::LegRequest;
 use quav::planner::leg_space::LegSpace;

@@ -1,5 +1,6 @@
 //! From features to a scenario.
 
+use super::heights::{Unusable, heights};
 use super::order::{NumberedItem, RoutePoint, ordered_items, ordered_points};
 use super::properties::{Role, altitude, circle, fence_role, number, numbered_item, role};
 use super::{Feature, Shape, Want};
@@ -27,6 +28,8 @@ struct Reader<'a> {
     shapeless: Vec<Place>,
     /// Obstacles with a hole that is filled, once for each hole.
     filled: Vec<Place>,
+    /// Regions whose heights cannot be used.
+    no_heights: Vec<Place>,
 }
 
 /// Makes a scenario of the features of the file `name`. `pins_are_route`: whether points that say
@@ -60,6 +63,14 @@ pub(in crate::formats) fn scenario(
         warnings.push(format!(
             "{}: a hole in an obstacle is filled, quavd does not plan inside it",
             listed(&reader.filled)
+        ));
+    }
+    if !reader.no_heights.is_empty() {
+        reader.no_heights.dedup();
+        warnings.push(format!(
+            "{}: its heights cannot be used (metres, the lower below the upper, of an obstacle), so \
+             that it counts at all altitudes",
+            listed(&reader.no_heights)
         ));
     }
     Ok(reader.scenario)
@@ -223,7 +234,21 @@ impl Reader<'_> {
         }
         let origin = format!("{} {}", self.name, feature.place);
         self.scenario.kept.regions.insert(origin.clone(), feature.properties.clone());
-        self.scenario.fences.regions.push(FenceRegion { role: fence_role(role), shape, origin });
+        let role = fence_role(role);
+        let heights = match heights(feature) {
+            Ok(None) => None,
+            // To stay inside an area up to some altitude only has no meaning on a map.
+            Ok(Some(_)) if role == FenceRole::Inclusion => {
+                self.no_heights.push(feature.place.clone());
+                None
+            }
+            Ok(heights) => heights,
+            Err(Unusable) => {
+                self.no_heights.push(feature.place.clone());
+                None
+            }
+        };
+        self.scenario.fences.regions.push(FenceRegion { role, shape, heights, origin });
         Ok(())
     }
 

@@ -2,6 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
+use super::heights::height_properties;
 use super::{Feature, Shape};
 use crate::fence::{FenceRegion, FenceRole, FenceShape};
 use crate::formats::Scenario;
@@ -122,6 +123,7 @@ fn region_feature(region: &FenceRegion) -> (Value, Shape) {
     };
     let mut properties = Map::new();
     properties.insert("fence".to_owned(), json!(fence));
+    properties.extend(height_properties(region.heights));
     let shape = match &region.shape {
         FenceShape::Polygon(ring) => Shape::Polygon { outer: ring.clone(), holes: Vec::new() },
         FenceShape::Circle { centre, radius } => {

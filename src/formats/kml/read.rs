@@ -108,6 +108,45 @@ struct Placemark {
     shapes: Vec<Shape>,
     outer: Option<Vec<LatLon>>,
     holes: Vec<Vec<LatLon>>,
+    /// The text of `altitudeMode` in the polygon being read; `None`: clamped to the ground.
+    altitude_mode: Option<String>,
+    /// How high the polygons so far reach.
+    heights: Heights,
+}
+
+/// What is known of the heights of a placemark's polygons.
+#[derive(Default)]
+enum Heights {
+    /// No polygon yet.
+    #[default]
+    None,
+    /// The highest vertex, and the `height_reference` of them all.
+    UpTo(f64, &'static str),
+    /// Not known, or they differ in what they are measured from.
+    Unknown,
+}
+
+impl Heights {
+    /// Takes in a polygon with the lowest and highest altitude of its vertices.
+    fn add(&mut self, mode: Option<&str>, altitudes: Option<(f64, f64)>) {
+        let reference = match mode {
+            Some("relativeToGround") => Some("ground"),
+            Some("absolute") => Some("amsl"),
+            _ => None,
+        };
+        let polygon = match (reference, altitudes) {
+            // A vertex on the ground is one whose altitude was not given.
+            (Some(reference), Some((low, high))) if low > 0.0 => Some((high, reference)),
+            _ => None,
+        };
+        *self = match (&*self, polygon) {
+            (Self::None, Some((high, reference))) => Self::UpTo(high, reference),
+            (&Self::UpTo(before, known), Some((high, reference))) if known == reference => {
+                Self::UpTo(before.max(high), reference)
+            }
+            _ => Self::Unknown,
+        };
+    }
 }
 
 impl State {
@@ -139,6 +178,8 @@ impl State {
                 shapes: Vec::new(),
                 outer: None,
                 holes: Vec::new(),
+                altitude_mode: None,
+                heights: Heights::None,
             });
         }
         if let (Some(placemark), "Data" | "SimpleData") = (&mut self.placemark, name.as_str()) {
@@ -170,6 +211,13 @@ impl State {
 impl Placemark {
     fn feature(&self) -> Feature {
         let mut properties = self.properties.clone();
+        let given = |key: &&str| properties.contains_key(*key);
+        if let Heights::UpTo(top, reference) = self.heights
+            && !["height", "max_height", "min_height", "height_reference"].iter().any(given)
+        {
+            properties.insert("height".to_owned(), top.into());
+            properties.insert("height_reference".to_owned(), reference.into());
+        }
         // A name that quavd's own writer made of the other properties says nothing.
         let ours = name_of(&properties);
         if let Some(name) = self.name.as_ref().filter(|name| Some(*name) != ours.as_ref()) {
@@ -189,8 +237,13 @@ impl Placemark {
                     self.properties.insert(key, value(text.trim()));
                 }
             }
+            (_, "altitudeMode") => self.altitude_mode = Some(text.trim().to_owned()),
             (_, "coordinates") => {
-                let line = coordinates(text)?;
+                let (line, altitudes) = coordinates(text)?;
+                let outline = within("LinearRing") && !within("innerBoundaryIs");
+                if outline {
+                    self.heights.add(self.altitude_mode.as_deref(), altitudes);
+                }
                 if within("innerBoundaryIs") {
                     self.holes.push(line);
                 } else if within("Polygon") {
@@ -212,6 +265,7 @@ impl Placemark {
                     advice: "draw it again or delete it",
                 })?;
                 let holes = std::mem::take(&mut self.holes);
+                self.altitude_mode = None;
                 self.shapes.push(Shape::Polygon { outer, holes });
             }
             _ => {}
@@ -220,8 +274,12 @@ impl Placemark {
     }
 }
 
-/// `lon,lat[,altitude]` tuples separated by white space.
-fn coordinates(text: &str) -> Result<Vec<LatLon>, Problem> {
+/// A lowest and a highest altitude, metres.
+type LowHigh = (f64, f64);
+
+/// `lon,lat[,altitude]` tuples separated by white space: the positions, and their lowest and highest
+/// altitude where each of them has one.
+fn coordinates(text: &str) -> Result<(Vec<LatLon>, Option<LowHigh>), Problem> {
     let tuple = |(index, tuple): (usize, &str)| {
         let numbers: Result<Vec<f64>, _> = tuple.split(',').map(str::parse).collect();
         numbers.map_err(|_| Problem::Value {
@@ -231,7 +289,13 @@ fn coordinates(text: &str) -> Result<Vec<LatLon>, Problem> {
         })
     };
     let tuples = text.split_whitespace().enumerate().map(tuple).collect::<Result<Vec<_>, _>>()?;
-    positions("vertex", tuples.iter().map(Vec::as_slice))
+    let altitudes = tuples.iter().map(|tuple| tuple.get(2).copied().filter(|z| z.is_finite()));
+    let altitudes = altitudes.collect::<Option<Vec<f64>>>().filter(|all| !all.is_empty());
+    let altitudes = altitudes.map(|all| {
+        all.iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &z| (low.min(z), high.max(z)))
+    });
+    Ok((positions("vertex", tuples.iter().map(Vec::as_slice))?, altitudes))
 }
 
 /// Extended data is text; numbers, lists and flags are taken as such.

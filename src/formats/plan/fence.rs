@@ -69,13 +69,13 @@ pub(super) fn read_fence(
         let origin = format!("{name} {here}");
         let ring = ring(polygon).map_err(|problem| problem.at(here))?;
         let shape = FenceShape::Polygon(ring);
-        fences.regions.push(FenceRegion { role: role(*inclusion), shape, origin });
+        fences.regions.push(FenceRegion { role: role(*inclusion), shape, heights: None, origin });
     }
     for (index, FenceCircle { circle, inclusion }) in circles.iter().enumerate() {
         let here = Place::FenceCircle(index + 1);
         let origin = format!("{name} {here}");
         let shape = read_circle(circle).map_err(|problem| problem.at(here))?;
-        fences.regions.push(FenceRegion { role: role(*inclusion), shape, origin });
+        fences.regions.push(FenceRegion { role: role(*inclusion), shape, heights: None, origin });
     }
     if let Some(point) = breach_return {
         fences.return_point = place_with_altitude("return point", &point)

@@ -2,7 +2,7 @@
 
 use crate::geodesy::LatLon;
 use crate::mission::altitude::Altitude;
-use crate::mission::legs::LegEnd;
+use crate::mission::legs::{JumpInsertion, LegEnd};
 use crate::units::Metres;
 
 /// Whether the vehicle can fly on to a waypoint.
@@ -37,6 +37,8 @@ pub(super) struct State {
     /// Whether there was a jump since the last item of navigation.
     pub(super) jumped: bool,
     pub(super) landing: Option<Landing>,
+    /// The only jump since the last item of navigation, where it can be given waypoints.
+    pub(super) by_jump: Option<JumpInsertion>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -66,6 +68,7 @@ impl State {
             jump: None,
             jumped: false,
             landing: None,
+            by_jump: None,
         }
     }
 

@@ -7,7 +7,7 @@ use crate::mission::legs::{LegKind, LegShape, ReturnTo};
 use crate::mission::testing::{
     any_mission, at, bits, execute, item, item_at, jump, mission, place, takeoff, waypoint,
 };
-use crate::mission::{FlightContext, Frame, legs};
+use crate::mission::{Autopilot, FlightContext, Frame, legs};
 
 fn legs_of(mission: &Mission) -> Vec<Leg> {
     legs(mission, &FlightContext::default()).unwrap().legs
@@ -263,6 +263,47 @@ fn a_mission_out_of_sequence_is_refused() {
     assert_eq!(splice(&mission, &[], &[]), Err(SpliceError::Sequence { item: 1, seq: 7 }));
 }
 
+fn ardupilots_legs(mission: &Mission) -> Vec<Leg> {
+    let context = FlightContext { autopilot: Autopilot::ArduPilot, ..FlightContext::default() };
+    legs(mission, &context).unwrap().legs
+}
+
+#[test]
+fn a_jump_goes_over_its_own_waypoints_and_all_else_past_them() {
+    let items =
+        [takeoff(), waypoint(1, 0), waypoint(2, 0), waypoint(3, 0), jump(2, 2.0), waypoint(4, 0)];
+    let mission = mission(items);
+    let legs = ardupilots_legs(&mission);
+    let leg = legs.iter().position(|leg| leg.by_jump.is_some()).unwrap();
+    assert_eq!((legs[leg].from.item, legs[leg].to.item), (Some(3), Some(2)));
+    let waypoints = vec![place(30, 1), place(30, 2)];
+    let result = splice(&mission, &legs, &[Detour { leg, waypoints }]).unwrap();
+    let new = &result.mission.items;
+    let commands: Vec<_> = new.iter().map(|item| item.command.0).collect();
+    assert_eq!(commands, [22, 16, 177, 16, 16, 16, 16, 177, 16]);
+    assert_eq!(new[2].params[..2], [5.0, -1.0], "past the waypoints, always");
+    assert_eq!(new[7].params[..2], [3.0, 2.0], "to the first of them");
+    assert_eq!(result.inserted, [3, 4]);
+    assert_eq!(result.notes, [SpliceNote::ByJump { jump: 4, target: 2 }]);
+    // The way past them is the leg that it was, and nothing leads to the waypoints but the jump.
+    let after = ardupilots_legs(&result.mission);
+    let ends = |leg: &&Leg| (leg.from.item, leg.to.item) == (Some(1), Some(5));
+    assert_eq!(after.iter().find(ends).unwrap().jump, None);
+    let into: Vec<_> = after.iter().filter(|leg| leg.to.item == Some(3)).collect();
+    assert_eq!(into.len(), 1, "{into:?}");
+    assert_eq!((into[0].from.item, into[0].jump), (Some(6), Some(7)));
+}
+
+#[test]
+fn a_jump_of_an_unknown_autopilot_and_one_behind_another_get_no_waypoints() {
+    let items = [waypoint(1, 0), waypoint(2, 0), jump(0, 2.0)];
+    assert!(legs_of(&mission(items)).iter().all(|leg| leg.by_jump.is_none()));
+    let chained = [waypoint(1, 0), waypoint(2, 0), jump(4, 1.0), waypoint(3, 0), jump(0, 1.0)];
+    let chained = ardupilots_legs(&mission(chained));
+    let both = chained.iter().find(|leg| leg.from.item == Some(1) && leg.to.item == Some(0));
+    assert_eq!(both.unwrap().by_jump, None);
+}
+
 /// Detours for some of the legs, at most one for each place to insert at, and none whose altitudes
 /// are not known.
 fn detours(mission: &Mission, legs: &[Leg], chosen: &[usize]) -> Vec<Detour> {
@@ -338,7 +379,7 @@ proptest! {
             let detour = detours.iter().find(|detour| {
                 let before = legs[detour.leg].insert_before.unwrap();
                 let first = last.map_or(0, |item: usize| item + 1);
-                !stop.jumped && (first..=stop.item).contains(&before)
+                stop.jumps.is_empty() && (first..=stop.item).contains(&before)
             });
             expected.extend(detour.iter().flat_map(|detour| detour.waypoints.iter().copied()));
             expected.push(mission.items[stop.item].e7());
@@ -348,6 +389,42 @@ proptest! {
             .iter()
             .map(|stop| result.mission.items[stop.item].e7())
             .collect();
+        prop_assert_eq!(flown, expected);
+    }
+
+    /// The same promise for the legs that a jump flies: whoever takes the jump flies its waypoints,
+    /// nobody else does, and all else is as before.
+    #[test]
+    fn waypoints_for_a_jump_are_flown_by_that_jump_alone(
+        mission in any_mission(),
+        chosen in prop::collection::vec(0..4_usize, 1..8),
+    ) {
+        let legs = ardupilots_legs(&mission);
+        let mut detours: Vec<Detour> = Vec::new();
+        for (leg, &count) in chosen.iter().cycle().take(legs.len()).enumerate() {
+            let Some(by) = legs[leg].by_jump.filter(|_| count > 0) else { continue };
+            let taken = |detour: &Detour| legs[detour.leg].by_jump.unwrap().target == by.target;
+            let waypoints = (0..count).map(|k| place(60 + leg as i32, k as i32)).collect();
+            let detour = Detour { leg, waypoints };
+            if !detours.iter().any(taken)
+                && splice(&mission, &legs, std::slice::from_ref(&detour)).is_ok()
+            {
+                detours.push(detour);
+            }
+        }
+        let result = splice(&mission, &legs, &detours).unwrap();
+        let new = &result.mission.items;
+        prop_assert_eq!(new.len(), mission.items.len() + result.inserted.len() + detours.len());
+        let mut expected = Vec::new();
+        for stop in execute(&mission.items, 80) {
+            for jump in &stop.jumps {
+                let of = |detour: &&Detour| legs[detour.leg].by_jump.unwrap().jump == *jump;
+                expected.extend(detours.iter().find(of).iter().flat_map(|d| d.waypoints.clone()));
+            }
+            expected.push(mission.items[stop.item].e7());
+        }
+        let flown: Vec<_> =
+            execute(new, expected.len()).iter().map(|stop| new[stop.item].e7()).collect();
         prop_assert_eq!(flown, expected);
     }
 

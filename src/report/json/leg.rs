@@ -25,6 +25,9 @@ pub struct LegDocument {
     pub straight_m: f64,
     /// The least clearance of what is flown now.
     pub min_clearance_m: f64,
+    /// The obstacles that the original leg is flown over or under, near enough to be in the way
+    /// otherwise.
+    pub flown_over_or_under: Vec<String>,
     /// The QAOA rounds.
     pub rounds: Vec<RoundDocument>,
     /// What the rounds started from, the first incumbent first.
@@ -97,6 +100,7 @@ impl From<&Stretch<'_>> for LegDocument {
             length_m: stretch.length.0,
             straight_m: length.0,
             min_clearance_m: stretch.clearance.0,
+            flown_over_or_under: stretch.before.passed.clone(),
             rounds: record.iter().flat_map(|r| &r.rounds).map(RoundDocument::from).collect(),
             candidates: record
                 .iter()

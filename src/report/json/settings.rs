@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::fence::{Limit, VehicleRules};
 use crate::planner::{CandidateSource, QpuSettings, Rounds};
 use crate::qaoa::{EngineChoice, EngineKind};
 use crate::replan::Options;
@@ -51,6 +52,40 @@ pub struct SettingsDocument {
     pub inclusion: String,
     /// How long planning may take, seconds.
     pub deadline: Option<f64>,
+    /// What legs keep from obstacles that they are flown over or under.
+    pub vertical_margin: Metres,
+    /// How far the ground may be above or below home; `null`: not said.
+    pub ground_relief: Option<Metres>,
+    /// What the vehicle's parameters say about its fence.
+    pub vehicle_fence: VehicleFenceDocument,
+}
+
+/// What the vehicle's parameters say about its fence; all empty without a vehicle.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct VehicleFenceDocument {
+    /// What counts and what does not, a sentence each.
+    pub applied: Vec<String>,
+    /// What is not known, a sentence each.
+    pub missing: Vec<String>,
+    /// The circle around home, metres.
+    pub radius_m: Option<f64>,
+    /// The ceiling, metres above home.
+    pub ceiling_m: Option<f64>,
+    /// The floor, metres above home.
+    pub floor_m: Option<f64>,
+}
+
+impl From<&VehicleRules> for VehicleFenceDocument {
+    fn from(rules: &VehicleRules) -> Self {
+        let metres = |limit: Option<Limit>| limit.map(|limit| limit.metres.0);
+        Self {
+            applied: rules.applied.clone(),
+            missing: rules.missing.clone(),
+            radius_m: metres(rules.limits.radius),
+            ceiling_m: metres(rules.limits.ceiling),
+            floor_m: metres(rules.limits.floor),
+        }
+    }
 }
 
 impl From<&Options> for SettingsDocument {
@@ -84,6 +119,9 @@ impl From<&Options> for SettingsDocument {
             zone: options.zone.map_or_else(|| "auto".to_owned(), |zone| zone.to_string()),
             inclusion: options.inclusion.to_string(),
             deadline: options.deadline.map(|time| time.as_secs_f64()),
+            vertical_margin: options.vertical.margin,
+            ground_relief: options.vertical.ground_relief,
+            vehicle_fence: (&options.rules).into(),
         }
     }
 }

@@ -12,7 +12,7 @@ const ROW: f64 = 21.5;
 const LETTERS: usize = 130;
 
 pub(super) fn findings(verdict: &Verdict, rect: Rect) -> Group {
-    let bad: Vec<&LegVerdict> = verdict.legs.iter().filter(|leg| leg.blocker.is_some()).collect();
+    let bad: Vec<&LegVerdict> = verdict.legs.iter().filter(|leg| !leg.is_clear()).collect();
     let title = if bad.is_empty() { "Every leg is clear" } else { "Not clear" };
     let rows = (rect.height / ROW) as usize - 2;
     let mut lines: Vec<String> = bad.iter().take(rows).map(|leg| finding(leg)).collect();

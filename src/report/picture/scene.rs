@@ -103,8 +103,8 @@ impl<'a> Scene<'a> {
         scene.margin = field.margin;
         let (flown, inserted) = match subject.after {
             None => {
-                scene.old = edges(subject.before, &|verdict| verdict.blocker.is_some())?;
-                scene.new = edges(subject.before, &|verdict| verdict.blocker.is_none())?;
+                scene.old = edges(subject.before, &|verdict| !verdict.is_clear())?;
+                scene.new = edges(subject.before, &LegVerdict::is_clear)?;
                 (subject.before, [].as_slice())
             }
             Some((after, inserted, records)) => {

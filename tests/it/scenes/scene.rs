@@ -54,6 +54,7 @@ impl Scene {
         let ground = self.ground();
         let place = |p: &P| -> LatLon { ground.position(*p) };
         let regions = self.regions.iter().enumerate().map(|(i, region)| FenceRegion {
+            heights: None,
             role: if region.inclusion { FenceRole::Inclusion } else { FenceRole::Exclusion },
             shape: match &region.shape {
                 Shape::Ring(ring) => FenceShape::Polygon(ring.iter().map(place).collect()),
