@@ -9,7 +9,8 @@ PACKAGES := cmake g++ make pkg-config sqlite3 libsqlite3-dev python3-venv system
 
 TOOLS := target/tools
 
-.PHONY: all build demo ibm-demo deb test-deb soak companions daemon-figures test test-rust test-python test-ibm lint doc bench bench-link bench-ibm examples clean system
+.PHONY: all build demo ibm-demo faults deb test-deb soak companions daemon-figures test test-rust test-python test-ibm lint doc \
+	bench bench-table bench-peers bench-link bench-ibm fuzz examples gallery reference clean system
 
 all: build
 
@@ -23,12 +24,13 @@ system:
 		DEBIAN_FRONTEND=noninteractive $$sudo apt-get install -y -qq --no-install-recommends $(PACKAGES); \
 	fi
 
-$(VENV)/.ready: sitl/requirements.txt
+$(VENV)/.ready: sitl/requirements.txt sitl/requirements-alone.txt
 	$(PYTHON) -c 'import ensurepip' 2>/dev/null || { \
 		sudo=; [ "$$(id -u)" = 0 ] || sudo=sudo; \
 		$$sudo apt-get update -qq && $$sudo apt-get install -y -qq python3-venv; }
 	$(PYTHON) -m venv $(VENV)
 	$(VENV)/bin/pip install --quiet --disable-pip-version-check -r sitl/requirements.txt
+	$(VENV)/bin/pip install --quiet --disable-pip-version-check --no-deps -r sitl/requirements-alone.txt
 	touch $@
 
 # qiskit, for the tests of the circuits and for the stand-in of IBM's service.
@@ -43,6 +45,15 @@ build: system
 # The main job: a fake vehicle with a mission through no-fly areas, re-planned, uploaded, verified.
 demo: build $(VENV)/.ready
 	$(VENV)/bin/python sitl/demo.py --quavd $(BIN) --scenario fence_examples/s1.plan --out out
+
+# The fault campaign at length: prints a table for each part, and the seeds of any run that failed.
+FAULT_RUNS ?= 2000
+FAULT_SEED ?= 1
+FAULT_WORKERS ?= 24
+faults: build $(VENV)/.ready
+	QUAV_PYTHON=$(CURDIR)/$(VENV)/bin/python QUAV_FAULT_RUNS=$(FAULT_RUNS) QUAV_FAULT_SEED=$(FAULT_SEED) \
+		QUAV_FAULT_WORKERS=$(FAULT_WORKERS) $(CARGO) test --release --locked --test it campaign:: -- \
+		--nocapture --test-threads 1
 
 # A Debian package: program, unit, example configuration, man pages, completions.
 deb: build $(TOOLS)/bin/cargo-deb
@@ -101,8 +112,26 @@ lint: system
 doc: system
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --locked --no-deps
 
+# Fuzzing: RUNS executions of each target from the corpora in tests/fuzz.
+RUNS ?= 100000
+fuzz: system
+	tests/fuzz/run $(RUNS)
+
 bench: system
 	$(CARGO) bench --locked --bench qaoa
+
+# Times and peak memory of engines and whole plans, one row each.
+bench-table: system
+	$(CARGO) bench --locked --bench table
+
+# quavd's engines beside PennyLane's, which takes minutes; STEPS=3 shortens its training.
+bench-peers: system $(VENV)-peers/.ready
+	QUAVD_PEERS_PYTHON=$(CURDIR)/$(VENV)-peers/bin/python $(CARGO) bench --locked --bench peers
+
+$(VENV)-peers/.ready: benches/requirements.txt
+	$(PYTHON) -m venv $(VENV)-peers
+	$(VENV)-peers/bin/pip install --quiet --disable-pip-version-check -r benches/requirements.txt
+	touch $@
 
 # Transfers on a 57,600 baud line and on one that loses 30 % each way.
 bench-link: system $(VENV)/.ready
@@ -122,6 +151,14 @@ examples: build
 		code=$$?; [ $$code = 0 ] || [ $$code = 3 ] || exit $$code; \
 	done
 
+# docs/configuration.md from the declarations in src/config.
+reference: system
+	QUAV_WRITE_REFERENCE=1 $(CARGO) test --release --locked --test it -- the_configuration_reference
+
+# A page of all examples with their reports: out/gallery/index.html.
+gallery: build
+	docs/gallery.sh $(BIN) out/gallery
+
 clean:
 	$(CARGO) clean
-	rm -rf $(VENV) $(VENV_IBM) out
+	rm -rf $(VENV) $(VENV)-peers $(VENV_IBM) out

@@ -3,54 +3,25 @@
 //! `cargo bench --bench qaoa` prints one table; `cargo bench --bench qaoa chain` only a part of it.
 #![allow(missing_docs, clippy::unwrap_used)]
 
+mod problems;
+
 use divan::{Bencher, black_box};
+use problems::{LAYERS, MEMORY, three_regular};
 use quav::qaoa::chain::ChainEngine;
 use quav::qaoa::engine::Engine;
 use quav::qaoa::statevector::{Precision, StatevectorEngine};
 use quav::qaoa::train::train;
-use quav::qaoa::{Angles, ChainIsing, Ising, Scale, TrainSettings};
+use quav::qaoa::{Angles, TrainSettings};
 use quav::stop::Stop;
-use rand::seq::SliceRandom;
-use rand::{Rng, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-
-const LAYERS: usize = 5;
-const MEMORY: u64 = 8 << 30;
 
 fn main() {
     divan::main();
 }
 
-fn coefficients(count: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
-    (0..count).map(|_| rng.random_range(-1.0..1.0)).collect()
-}
-
 fn chain(qubits: usize) -> ChainEngine {
-    let rng = &mut ChaCha8Rng::seed_from_u64(1);
-    let (h, j) = (coefficients(qubits, rng), coefficients(qubits - 1, rng));
-    let ising = Ising::from(ChainIsing::new(0.0, h, j).unwrap());
-    let scaled = ising.scaled(Scale::Sigma).ising.to_chain().unwrap();
-    ChainEngine::new(scaled, MEMORY)
-}
-
-/// A random 3-regular graph: three stubs per qubit, paired at random until no pair is bad.
-fn three_regular(qubits: usize) -> Ising {
-    let rng = &mut ChaCha8Rng::seed_from_u64(2);
-    let couplings = loop {
-        let mut stubs: Vec<usize> = (0..3 * qubits).map(|stub| stub / 3).collect();
-        stubs.shuffle(rng);
-        let mut edges: Vec<(usize, usize)> = stubs
-            .chunks_exact(2)
-            .map(|pair| (pair[0].min(pair[1]), pair[0].max(pair[1])))
-            .collect();
-        edges.sort_unstable();
-        edges.dedup();
-        if edges.len() == 3 * qubits / 2 && edges.iter().all(|(i, j)| i != j) {
-            break edges.into_iter().map(|(i, j)| (i, j, rng.random_range(-1.0..1.0))).collect();
-        }
-    };
-    let ising = Ising::new(0.0, coefficients(qubits, rng), couplings).unwrap();
-    ising.scaled(Scale::Sigma).ising.into_owned()
+    ChainEngine::new(problems::chain(qubits), MEMORY)
 }
 
 const CHAINS: [usize; 3] = [20, 100, 1000];

@@ -6,14 +6,14 @@ use std::time::Instant;
 use clap::Args;
 
 use super::CliError;
-use super::files;
+use super::files::{self, out_format};
 use super::options::SafetyArgs;
-use super::plan::{position_of_start, to_json};
+use super::plan::{name_of, position_of_start, to_json};
 use super::progress::Shown;
-use crate::replan::{Input, judge};
-use crate::report::Run;
+use crate::replan::{Input, fields, judge};
 use crate::report::json::CheckDocument;
 use crate::report::summary::check_summary;
+use crate::report::{Report, Run};
 
 /// The arguments of `quavd check`.
 #[derive(Debug, Args)]
@@ -25,6 +25,9 @@ pub struct CheckArgs {
     /// Print one JSON document on stdout.
     #[arg(long)]
     pub json: bool,
+    /// Write a picture or a report (.svg, .png, .html). May be repeated.
+    #[arg(long, value_name = "FILE")]
+    pub out: Vec<PathBuf>,
     /// Distances and further fences.
     #[command(flatten)]
     pub safety: SafetyArgs,
@@ -35,6 +38,14 @@ pub struct CheckArgs {
 /// # Errors
 /// [`CliError`]: exit code 3 where the mission is not clear.
 pub fn run(args: &CheckArgs, shown: &Shown) -> Result<String, CliError> {
+    for path in &args.out {
+        if !out_format(path)?.is_shown() {
+            let path = path.display();
+            return Err(CliError::Usage(format!(
+                "{path}: check changes no mission, so it writes .svg, .png and .html only"
+            )));
+        }
+    }
     let began = Instant::now();
     let mut scenario = files::scenario(&args.scenario, &args.safety)?;
     if let Some(path) = &args.mission {
@@ -56,6 +67,12 @@ pub fn run(args: &CheckArgs, shown: &Shown) -> Result<String, CliError> {
     let verdict = judge(&input, &options)?;
     shown.warn(&scenario.warnings);
     let run = Run { options: &options, warnings: &scenario.warnings, load, total: began.elapsed() };
+    if !args.out.is_empty() {
+        let fields = fields(&input, &options)?;
+        let title = name_of(args.mission.as_ref().unwrap_or(&args.scenario));
+        let report = Report::judged(&verdict, &fields, run, &title, &scenario.fences);
+        files::write_shown(&args.out, &report)?;
+    }
     let text = if args.json {
         to_json(&CheckDocument::new(&verdict, &run))?
     } else {

@@ -5,11 +5,13 @@
 //! - [`measure`]: every method on a scenario: length, time, clearance, collisions;
 //! - [`growth`]: time over the number of edges, with a fitted exponent;
 //! - [`table`]: the result for people;
+//! - [`page`]: the same as HTML;
 //! - [`picture`]: loss curves as SVG.
 
 pub mod growth;
 pub mod legs;
 pub mod measure;
+pub mod page;
 pub mod picture;
 pub mod table;
 
@@ -21,11 +23,13 @@ use serde::Serialize;
 use super::CliError;
 use super::files::{self, FileError, OutFormat, out_format};
 use super::options::PlanningArgs;
-use super::plan::to_json;
+use super::plan::{file_options, quoted, to_json};
 use super::progress::Shown;
 use crate::baseline::paper::{PaperLengths, paper_lengths};
 use crate::planner::Settings;
+use crate::replan::Options;
 use crate::report::json::SettingsDocument;
+use crate::report::page::reproduce;
 use crate::units::Metres;
 use growth::Growth;
 use legs::LegTask;
@@ -40,9 +44,10 @@ pub struct CompareArgs {
     /// Print one JSON document on stdout; it holds the loss curves too.
     #[arg(long)]
     pub json: bool,
-    /// Write the loss curves of the first QAOA training of each scenario as a picture (.svg).
+    /// Write a report (.html), or the loss curves of the first QAOA training of each scenario
+    /// (.svg). May be repeated.
     #[arg(long, value_name = "FILE")]
-    pub out: Option<PathBuf>,
+    pub out: Vec<PathBuf>,
     /// Seeds that RRT is run with; lengths and times are means over them.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=1000), value_name = "N")]
     pub seeds: u32,
@@ -104,11 +109,13 @@ impl From<&PaperLengths> for PaperFigures {
 /// [`CliError`]: a scenario cannot be read, or has no leg that needs planning. A method that finds
 /// no path is a result.
 pub fn run(args: &CompareArgs, shown: &Shown) -> Result<String, CliError> {
-    if let Some(path) = &args.out
-        && out_format(path)? != OutFormat::Svg
-    {
-        let path = path.display();
-        return Err(CliError::Usage(format!("{path}: loss curves are written as .svg only")));
+    for path in &args.out {
+        if !matches!(out_format(path)?, OutFormat::Svg | OutFormat::Html) {
+            let path = path.display();
+            return Err(CliError::Usage(format!(
+                "{path}: a comparison is written as .html, its loss curves as .svg"
+            )));
+        }
     }
     let options = args.planning.options();
     let buffer = options.settings.buffer;
@@ -156,10 +163,28 @@ pub fn run(args: &CompareArgs, shown: &Shown) -> Result<String, CliError> {
     }
     shown.clear();
     let comparison = Comparison { scenarios, growth, settings: SettingsDocument::from(&options) };
-    if let Some(path) = &args.out {
-        files::write(path, picture::loss_curves(&comparison.scenarios).as_bytes())?;
+    for path in &args.out {
+        let text = match out_format(path)? {
+            OutFormat::Html => page::comparison_page(&comparison, &command(args, &options)),
+            _ => picture::loss_curves(&comparison.scenarios),
+        };
+        files::write(path, text.as_bytes())?;
     }
     if args.json { to_json(&comparison) } else { Ok(table::text(&comparison)) }
+}
+
+/// The command that compares the same again.
+fn command(args: &CompareArgs, options: &Options) -> String {
+    let scenarios = args.scenarios.iter().map(|path| quoted(path));
+    let files: Vec<String> = scenarios.collect();
+    format!(
+        "quavd compare {}{} --seeds {} --edges {}{}",
+        files.join(" "),
+        file_options(&args.planning.safety),
+        args.seeds,
+        args.edges,
+        reproduce::arguments(options)
+    )
 }
 
 fn name(path: &Path) -> String {

@@ -8,11 +8,12 @@ use super::CliError;
 use super::options::SafetyArgs;
 use crate::fence::FenceSet;
 use crate::formats::{
-    MAX_FILE_BYTES, Scenario, read_fences, read_mission, read_scenario, write_geojson, write_kml,
-    write_plan, write_waypoints,
+    Fences, MAX_FILE_BYTES, Scenario, read_fences, read_mission, read_scenario, write_fence_text,
+    write_geojson, write_kml, write_kmz, write_plan, write_waypoints, write_waypoints_fence,
+    write_waypoints_rally,
 };
-use crate::geodesy::ProjectionError;
 use crate::mission::Mission;
+use crate::report::{Report, ReportError};
 
 /// A file that cannot be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -35,8 +36,8 @@ pub enum FileError {
     },
     /// A suffix that no format has.
     #[error(
-        "cannot tell the format of {}: the name must end in .plan, .waypoints, .geojson, .kml or \
-         .svg", .0.display()
+        "cannot tell the format of {}: the name must end in .plan, .waypoints, .fence, .rally, .fen, \
+         .geojson, .kml, .kmz, .svg, .png or .html", .0.display()
     )]
     Suffix(PathBuf),
     /// A scenario without a mission.
@@ -51,12 +52,32 @@ pub enum OutFormat {
     Plan,
     /// `QGC WPL 110`.
     Waypoints,
+    /// The fences as `QGC WPL 110`.
+    Fence,
+    /// The rally points as `QGC WPL 110`.
+    Rally,
+    /// The fence as ArduPilot's old fence text, which Mission Planner calls `.fen`.
+    FenceText,
     /// GeoJSON.
     GeoJson,
     /// KML.
     Kml,
+    /// Compressed KML.
+    Kmz,
     /// A picture.
     Svg,
+    /// The same in pixels.
+    Png,
+    /// The report.
+    Html,
+}
+
+impl OutFormat {
+    /// Whether it shows what a command came to, instead of holding a mission.
+    #[must_use]
+    pub fn is_shown(self) -> bool {
+        matches!(self, Self::Svg | Self::Png | Self::Html)
+    }
 }
 
 /// The format that a file's suffix asks for.
@@ -67,9 +88,15 @@ pub fn out_format(path: &Path) -> Result<OutFormat, FileError> {
     match path.extension().and_then(|suffix| suffix.to_str()) {
         Some("plan") => Ok(OutFormat::Plan),
         Some("waypoints") => Ok(OutFormat::Waypoints),
+        Some("fence") => Ok(OutFormat::Fence),
+        Some("rally") => Ok(OutFormat::Rally),
+        Some("fen") => Ok(OutFormat::FenceText),
         Some("geojson") => Ok(OutFormat::GeoJson),
         Some("kml") => Ok(OutFormat::Kml),
+        Some("kmz") => Ok(OutFormat::Kmz),
         Some("svg") => Ok(OutFormat::Svg),
+        Some("png") => Ok(OutFormat::Png),
+        Some("html") => Ok(OutFormat::Html),
         _ => Err(FileError::Suffix(path.to_owned())),
     }
 }
@@ -80,7 +107,11 @@ pub fn out_format(path: &Path) -> Result<OutFormat, FileError> {
 /// [`CliError::Usage`] naming the file and the place in it.
 pub fn scenario(path: &Path, safety: &SafetyArgs) -> Result<Scenario, CliError> {
     let mut scenario = read_scenario(&path.to_string_lossy(), &bytes(path)?)?;
-    add_fences(&mut scenario.fences, &mut scenario.warnings, safety)?;
+    for more in further_fences(safety) {
+        let more = more?;
+        add(&mut scenario.fences, &mut scenario.warnings, more.fences, more.warnings);
+        scenario.kept.add_fences_of(more.kept);
+    }
     Ok(scenario)
 }
 
@@ -101,13 +132,23 @@ pub fn add_fences(
     warnings: &mut Vec<String>,
     safety: &SafetyArgs,
 ) -> Result<(), CliError> {
-    for path in safety.fence.iter().chain(&safety.obstacles) {
-        let more = read_fences(&path.to_string_lossy(), &bytes(path)?)?;
-        fences.regions.extend(more.fences.regions);
-        fences.return_point = fences.return_point.or(more.fences.return_point);
-        warnings.extend(more.warnings);
+    for more in further_fences(safety) {
+        let more = more?;
+        add(fences, warnings, more.fences, more.warnings);
     }
     Ok(())
+}
+
+/// The fences of `--fence` and `--obstacles`, file by file.
+fn further_fences(safety: &SafetyArgs) -> impl Iterator<Item = Result<Fences, CliError>> {
+    let files = safety.fence.iter().chain(&safety.obstacles);
+    files.map(|path| Ok(read_fences(&path.to_string_lossy(), &bytes(path)?)?))
+}
+
+fn add(fences: &mut FenceSet, warnings: &mut Vec<String>, more: FenceSet, odd: Vec<String>) {
+    fences.regions.extend(more.regions);
+    fences.return_point = fences.return_point.or(more.return_point);
+    warnings.extend(odd);
 }
 
 /// A file's bytes; one byte more than any reader takes, at the most.
@@ -122,47 +163,48 @@ pub fn bytes(path: &Path) -> Result<Vec<u8>, FileError> {
     Ok(bytes)
 }
 
-/// Writes a scenario (or the picture, where the format is one) to each file, whole or not at all.
+/// Writes a scenario (or the report on it, where the format is one) to each file, whole or not at all.
 ///
 /// # Errors
 /// [`CliError::Usage`] where a file cannot be written or its format cannot hold the mission.
 pub fn write_all(
     paths: &[PathBuf],
     scenario: &Scenario,
-    picture: impl Fn() -> Result<String, ProjectionError>,
+    report: &Report<'_>,
 ) -> Result<(), CliError> {
     for path in paths {
+        let undrawn = |error: ReportError| {
+            CliError::Usage(format!("cannot draw {}: {error}", path.display()))
+        };
         let unusable = |error: crate::formats::WriteError| {
             CliError::Usage(format!("cannot write {}: {error}", path.display()))
         };
-        let text = match out_format(path)? {
-            OutFormat::Plan => write_plan(scenario).map_err(unusable)?,
-            OutFormat::Waypoints => write_waypoints(&scenario.mission).map_err(unusable)?,
-            OutFormat::GeoJson => write_geojson(scenario).map_err(unusable)?,
-            OutFormat::Kml => write_kml(scenario).map_err(unusable)?,
-            OutFormat::Svg => picture().map_err(|error| {
-                CliError::Usage(format!("cannot draw {}: {error}", path.display()))
-            })?,
+        let bytes = match out_format(path)? {
+            OutFormat::Plan => write_plan(scenario).map(String::into_bytes),
+            OutFormat::Waypoints => write_waypoints(&scenario.mission).map(String::into_bytes),
+            OutFormat::Fence => write_waypoints_fence(&scenario.fences).map(String::into_bytes),
+            OutFormat::Rally => Ok(write_waypoints_rally(&scenario.rally).into_bytes()),
+            OutFormat::FenceText => write_fence_text(&scenario.fences).map(String::into_bytes),
+            OutFormat::GeoJson => write_geojson(scenario).map(String::into_bytes),
+            OutFormat::Kml => write_kml(scenario).map(String::into_bytes),
+            OutFormat::Kmz => write_kmz(scenario),
+            OutFormat::Svg => Ok(report.svg().map_err(undrawn)?.into_bytes()),
+            OutFormat::Png => Ok(report.png().map_err(undrawn)?),
+            OutFormat::Html => Ok(report.html().map_err(undrawn)?.into_bytes()),
         };
-        write(path, text.as_bytes())?;
+        write(path, &bytes.map_err(unusable)?)?;
     }
     Ok(())
 }
 
-/// Writes the picture to those of the files that are pictures.
+/// Writes the report to those of the files that are pictures or pages.
 ///
 /// # Errors
 /// As [`write_all`].
-pub fn write_pictures(
-    paths: &[PathBuf],
-    picture: impl Fn() -> Result<String, ProjectionError>,
-) -> Result<(), CliError> {
-    let pictures: Vec<PathBuf> = paths
-        .iter()
-        .filter(|path| matches!(out_format(path), Ok(OutFormat::Svg)))
-        .cloned()
-        .collect();
-    write_all(&pictures, &Scenario::default(), picture)
+pub fn write_shown(paths: &[PathBuf], report: &Report<'_>) -> Result<(), CliError> {
+    let is_shown = |path: &&PathBuf| out_format(path).is_ok_and(OutFormat::is_shown);
+    let shown: Vec<PathBuf> = paths.iter().filter(is_shown).cloned().collect();
+    write_all(&shown, &Scenario::default(), report)
 }
 
 /// Replaces a file by new content, whole or not at all.

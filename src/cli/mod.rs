@@ -4,8 +4,8 @@
 //! - [`options`]: what the commands have in common, with the names of the configuration file;
 //! - [`signing`]: the options that sign a link;
 //! - [`files`]: scenarios, missions and fences from files, results to files;
-//! - [`progress`]: what is shown while something runs;
-//! - [`run`], [`status`], [`plan`], [`check`], [`once`], [`compare`], [`qaoa`], [`ibm`]: one command
+//! - [`progress`]: what is shown while something runs; [`terminal`]: what the terminal can show;
+//! - [`mod@run`], [`status`], [`plan`], [`check`], [`once`], [`compare`], [`qaoa`], [`ibm`]: one command
 //!   each;
 //! - [`generate`]: manual pages and completions;
 //! - [`memory`]: what the machine has left;
@@ -15,6 +15,7 @@ pub mod check;
 pub mod compare;
 pub mod exit;
 pub mod files;
+mod flight;
 pub mod generate;
 pub mod ibm;
 pub mod memory;
@@ -26,6 +27,7 @@ pub mod qaoa;
 pub mod run;
 pub mod signing;
 pub mod status;
+pub mod terminal;
 
 use std::process::ExitCode;
 
@@ -118,6 +120,7 @@ fn start_log(verbose: u8, quiet: bool, is_daemon: bool) {
         tracing_subscriber::fmt::layer()
             .with_writer(std::io::stderr)
             .with_target(false)
+            .with_ansi(terminal::has_colours(&std::io::stderr()))
             .without_time()
     });
     // A second subscriber (in tests) is no reason to fail.

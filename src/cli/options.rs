@@ -72,6 +72,14 @@ fn lambda(text: &str) -> Result<f64, String> {
     number(text, 0.0, 1000.0)
 }
 
+/// The share of measurements that CVaR looks at.
+///
+/// # Errors
+/// What a user should give instead.
+pub(super) fn cvar(text: &str) -> Result<f64, String> {
+    number(text, 0.001, 1.0)
+}
+
 fn deadline(text: &str) -> Result<f64, String> {
     number(text, 0.001, 1e6)
 }
@@ -145,7 +153,8 @@ pub struct PlanningArgs {
     /// Distances and fences.
     #[command(flatten)]
     pub safety: SafetyArgs,
-    /// Edges of a leg's path, one qubit each; legs with more corners get more.
+    /// Edges of a leg's path, one qubit each. Legs with more corners get more; engines other than
+    /// chain then take them in windows of this many qubits.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u16).range(2..=2000))]
     pub qubits: u16,
     /// QAOA layers.
@@ -157,6 +166,10 @@ pub struct PlanningArgs {
     /// Adam's learning rate.
     #[arg(long, default_value_t = 0.1, value_parser = learning_rate)]
     pub learning_rate: f64,
+    /// Train on the mean of this share of the best measurements (CVaR) instead of ⟨H⟩: exact with the
+    /// statevector engine, estimated from --shots samples at every step with the chain engine.
+    #[arg(long, value_parser = cvar, value_name = "ALPHA")]
+    pub cvar: Option<f64>,
     /// Shots of each QAOA run.
     #[arg(long, default_value_t = 1024, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub shots: u32,
@@ -176,6 +189,10 @@ pub struct PlanningArgs {
     /// What being near an obstacle costs, metres: λ of λ·exp(−d/buffer). Higher keeps further off.
     #[arg(long, default_value_t = 0.05, value_parser = lambda, value_name = "M")]
     pub lambda: f64,
+    /// Most waypoints to insert in all; corners are merged until that is kept, the path getting
+    /// longer.
+    #[arg(long, value_name = "N")]
+    pub max_waypoints: Option<u16>,
     /// QAOA engine: auto, chain, statevector, or ibm (a QPU; see the options below).
     #[arg(long, default_value = "auto", value_name = "ENGINE")]
     pub engine: EngineChoice,
@@ -185,7 +202,7 @@ pub struct PlanningArgs {
     pub deadline: Option<f64>,
     /// Exactly the settings of the paper's table: 20 qubits, 5 layers, 60 Adam steps at 0.1 in
     /// every round, 5 m buffer, grid candidates.
-    #[arg(long, conflicts_with_all = ["buffer", "qubits", "layers", "steps", "learning_rate", "candidates", "grid"])]
+    #[arg(long, conflicts_with_all = ["buffer", "qubits", "layers", "steps", "learning_rate", "cvar", "candidates", "grid"])]
     pub paper: bool,
     /// On a QPU.
     #[command(flatten)]
@@ -238,7 +255,13 @@ impl SafetyArgs {
     #[must_use]
     pub fn options(&self) -> Options {
         let settings = Settings { buffer: Metres(self.buffer), ..Settings::default() };
-        Options { settings, zone: self.zone.0, inclusion: self.inclusion, deadline: None }
+        Options {
+            settings,
+            zone: self.zone.0,
+            inclusion: self.inclusion,
+            most_waypoints: None,
+            deadline: None,
+        }
     }
 }
 
@@ -267,6 +290,7 @@ impl PlanningArgs {
             layers: usize::from(self.layers),
             steps: self.steps as usize,
             learning_rate: self.learning_rate,
+            cvar: self.cvar,
             grid: Metres(self.grid),
             source: self.candidates,
             ..Settings::default()
@@ -283,6 +307,7 @@ impl PlanningArgs {
             ..base
         };
         let deadline = self.deadline.map(Duration::from_secs_f64);
-        Options { settings, deadline, ..self.safety.options() }
+        let most_waypoints = self.max_waypoints.map(usize::from);
+        Options { settings, deadline, most_waypoints, ..self.safety.options() }
     }
 }

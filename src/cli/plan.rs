@@ -7,16 +7,16 @@ use clap::Args;
 use serde::Serialize;
 
 use super::CliError;
-use super::files::{self, out_format};
-use super::options::{PlanningArgs, as_qpu};
+use super::files::{self, OutFormat, out_format};
+use super::options::{PlanningArgs, SafetyArgs, as_qpu};
 use super::progress::Shown;
-use crate::formats::Scenario;
+use super::terminal;
+use crate::formats::{Scenario, plan_flattened};
 use crate::geodesy::LatLon;
 use crate::replan::{Input, Options, Progress, Replanned, Verdict, fields, judge, replan_with};
-use crate::report::Run;
 use crate::report::json::PlanDocument;
-use crate::report::picture::{Subject, picture};
 use crate::report::summary::plan_summary;
+use crate::report::{Report, Run};
 use crate::stop::Stop;
 
 /// The arguments of `quavd plan`.
@@ -27,8 +27,8 @@ pub struct PlanArgs {
     /// Print one JSON document on stdout.
     #[arg(long)]
     pub json: bool,
-    /// Write the result to a file; the suffix gives the format (.plan, .waypoints, .geojson, .kml,
-    /// .svg). May be repeated.
+    /// Write the result to a file; the suffix gives the format (.plan, .waypoints, .fence, .rally,
+    /// .fen, .geojson, .kml, .kmz; .svg, .png or .html to look at). May be repeated.
     #[arg(long, value_name = "FILE")]
     pub out: Vec<PathBuf>,
     /// Where jobs for a QPU are recorded.
@@ -77,27 +77,65 @@ pub fn run(args: &PlanArgs, shown: &Shown) -> Result<String, CliError> {
     let total = began.elapsed();
     let outcome = Outcome { planned, before, options: &options, warnings, load, total };
     let title = name_of(&args.scenario);
+    let mut map = String::new();
+    let command = command("plan", &args.scenario, &args.planning.safety);
     match (&outcome.planned, &outcome.before) {
         (Ok(planned), _) => {
-            files::write_all(&args.out, &planned_scenario(&scenario, planned), || {
-                picture(planned, &outcome.run(), &title)
-            })?;
+            let new = planned_scenario(&scenario, planned);
+            let report = Report::planned(planned, outcome.run(), &title, &scenario.fences);
+            let report = Report { command: Some(&command), ..report };
+            files::write_all(&args.out, &new, &report)?;
+            if !args.json && !shown.is_quiet() && terminal::shows_dots() {
+                let colours = terminal::has_colours(&std::io::stdout());
+                // A map that cannot be drawn is no reason to withhold the summary.
+                map = report.terminal(colours).map(|map| map + "\n").unwrap_or_default();
+            }
+            if args.out.iter().any(|path| matches!(out_format(path), Ok(OutFormat::Plan))) {
+                shown.warn(&plan_flattened(&new));
+            }
         }
         // Without a plan there is nothing to fly, but a picture shows what is in the way.
-        (Err(_), Some(before)) => {
+        (Err(error), Some(before)) => {
             let fields = fields(&input, &options)?;
-            files::write_pictures(&args.out, || {
-                picture(Subject::judged(before, &fields), &outcome.run(), &title)
-            })?;
+            let report = Report::judged(before, &fields, outcome.run(), &title, &scenario.fences);
+            let reason = error.to_string();
+            let report = Report { command: Some(&command), reason: Some(&reason), ..report };
+            files::write_shown(&args.out, &report)?;
         }
         (Err(_), None) => {}
     }
-    outcome.told(args.json, None)
+    Ok(map + &outcome.told(args.json, None)?)
 }
 
 /// What a picture of a file is called.
-fn name_of(path: &Path) -> String {
+pub(super) fn name_of(path: &Path) -> String {
     path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
+/// The command with its files, as a shell takes it; how to plan follows in reports.
+pub(super) fn command(name: &str, scenario: &Path, safety: &SafetyArgs) -> String {
+    format!("{name} {}{}", quoted(scenario), file_options(safety))
+}
+
+/// The options that name further files, each with a space before it.
+pub(super) fn file_options(safety: &SafetyArgs) -> String {
+    let mut options = String::new();
+    for (option, files) in [("--fence", &safety.fence), ("--obstacles", &safety.obstacles)] {
+        for file in files {
+            options += &format!(" {option} {}", quoted(file));
+        }
+    }
+    options
+}
+
+/// A path for a shell.
+pub(super) fn quoted(path: &Path) -> String {
+    let text = path.to_string_lossy();
+    let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+:=,".contains(c);
+    if !text.is_empty() && text.chars().all(plain) {
+        return text.into_owned();
+    }
+    format!("'{}'", text.replace('\'', "'\\''"))
 }
 
 /// Where a file's vehicle stands: home, where the file has one.

@@ -33,6 +33,12 @@ impl Shown {
         Self { bar, quiet }
     }
 
+    /// Whether only results and errors are wanted.
+    #[must_use]
+    pub fn is_quiet(&self) -> bool {
+        self.quiet
+    }
+
     /// Says what is being done.
     pub fn doing(&self, what: impl Into<String>) {
         self.bar.enable_steady_tick(Duration::from_millis(100));

@@ -14,8 +14,8 @@ use super::memory;
 use crate::qaoa::angles::AnglesError;
 use crate::qaoa::statevector::Precision;
 use crate::qaoa::{
-    Angles, AnglesSource, EngineChoice, EngineError, Ising, IsingError, Qaoa, QaoaRun, RunSettings,
-    Scale, TrainSettings,
+    Angles, AnglesSource, EngineChoice, EngineError, Ising, IsingError, Objective, Qaoa, QaoaRun,
+    RunSettings, Scale, TrainSettings,
 };
 use crate::stop::Stop;
 
@@ -39,6 +39,10 @@ pub struct QaoaArgs {
     /// Adam's learning rate.
     #[arg(long, default_value_t = 0.1, value_parser = learning_rate)]
     pub learning_rate: f64,
+    /// Train on the mean of this share of the best measurements (CVaR) instead of ⟨H⟩: exact with the
+    /// statevector engine, estimated from --shots samples at every step with the chain engine.
+    #[arg(long, value_parser = super::options::cvar, value_name = "ALPHA", conflicts_with = "gammas")]
+    pub cvar: Option<f64>,
     /// Measurements of the trained circuit.
     #[arg(long, default_value_t = 1024, value_parser = clap::value_parser!(u32).range(0..=1_000_000))]
     pub shots: u32,
@@ -192,6 +196,10 @@ fn settings(args: &QaoaArgs) -> Result<RunSettings, QaoaCommandError> {
             steps: args.steps as usize,
             learning_rate: args.learning_rate,
             settled: None,
+            objective: args.cvar.map_or(Objective::Mean, |alpha| {
+                // No samples at all would give nothing to estimate from.
+                Objective::Cvar { alpha, shots: args.shots.max(1), seed: args.seed }
+            }),
         },
         shots: args.shots,
         seed: args.seed,
@@ -229,6 +237,8 @@ pub(super) fn document(run: &QaoaRun, time_ms: f64) -> Value {
         "qubits": run.qubits,
         "layers": run.angles.layers(),
         "expectation": run.expectation,
+        "objective": run.objective.to_string(),
+        "loss_is_sampled": run.loss_is_sampled,
         "loss": run.loss,
         "gammas": run.angles.gammas(),
         "betas": run.angles.betas(),
@@ -264,8 +274,11 @@ pub(super) fn summary(run: &QaoaRun, time_ms: f64) -> String {
     ));
     match run.loss.first() {
         Some(start) if steps > 0 => line(format_args!(
-            "expectation   {:.6}  (from {start:.6} in {steps} Adam steps)",
-            run.expectation
+            "expectation   {:.6}  ({} from {start:.6} to {:.6} in {steps} Adam steps{})",
+            run.expectation,
+            run.objective,
+            run.loss.iter().copied().fold(f64::INFINITY, f64::min),
+            if run.loss_is_sampled { ", each from samples" } else { "" }
         )),
         _ => line(format_args!("expectation   {:.6}", run.expectation)),
     }

@@ -3,7 +3,7 @@
 //! An option of the file is an option of the command line under the same name: [`options`]
 //! declares those of the daemon for clap and takes in those of planning, and [`document`] turns a
 //! file into arguments for them. So each option's name, type, range, default and text stand in one
-//! place, which [`reference`] reads for the commented example and for documents.
+//! place, which [`mod@reference`] reads for the commented example and for documents.
 
 pub mod document;
 pub mod options;

@@ -106,7 +106,7 @@ pub enum Problem {
     /// None of the formats.
     #[error(
         "this is none of the formats quavd reads: QGroundControl .plan, QGC WPL 110 waypoints, \
-         GeoJSON, KML, ArduPilot fence text"
+         GeoJSON, KML, KMZ, ArduPilot fence and rally text"
     )]
     UnknownFormat,
     /// A format that is recognised but not read.
@@ -120,6 +120,9 @@ pub enum Problem {
     /// Broken JSON, or JSON of another shape; the parser's words with line and column.
     #[error("{0}; correct the JSON there")]
     Json(String),
+    /// A broken archive, in the reader's words.
+    #[error("this KMZ cannot be read: {0}; save it again, or give the .kml in it")]
+    Archive(String),
     /// Broken XML, in the parser's words.
     #[error("{0}; correct the XML there")]
     Xml(String),
@@ -223,6 +226,18 @@ pub enum WriteError {
         /// Why.
         problem: FenceItemProblem,
     },
+    /// A fence that the old text cannot express.
+    #[error(
+        "the old fence text holds one inclusion polygon with a return point, and here is {what}; \
+         write it as .fence (QGC WPL 110)"
+    )]
+    FenceText {
+        /// What is there instead.
+        what: String,
+    },
+    /// An archive that could not be made.
+    #[error("the archive could not be made: {0}")]
+    Archive(String),
     /// A jump to an item that does not exist.
     #[error(
         "mission item {item} jumps to item {target}, which does not exist; correct the jump's \

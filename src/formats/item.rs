@@ -74,7 +74,7 @@ impl FileItem {
 }
 
 /// The frame without its `_INT`: a file holds degrees, and ground stations edit only these.
-fn in_degrees(frame: Frame) -> Frame {
+pub(super) fn in_degrees(frame: Frame) -> Frame {
     match frame {
         Frame::GLOBAL_INT => Frame::GLOBAL,
         Frame::GLOBAL_RELATIVE_ALT_INT => Frame::GLOBAL_RELATIVE_ALT,

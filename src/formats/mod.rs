@@ -14,15 +14,20 @@ mod feature;
 mod fence_text;
 mod geojson;
 mod item;
+mod kept;
 mod kml;
+mod kmz;
 mod plan;
 mod waypoints;
 
 pub use error::{FormatError, Place, Problem, WriteError};
 pub use feature::DEFAULT_ROUTE_ALTITUDE;
+pub use fence_text::write_fence_text;
 pub use geojson::write_geojson;
+pub use kept::Kept;
 pub use kml::write_kml;
-pub use plan::write_plan;
+pub use kmz::write_kmz;
+pub use plan::{plan_flattened, write_plan};
 pub use waypoints::{write_waypoints, write_waypoints_fence, write_waypoints_rally};
 
 use crate::fence::FenceSet;
@@ -50,6 +55,8 @@ pub struct Scenario {
     pub rally: Vec<MissionItem>,
     /// For which vehicle it was drawn, where the file says so.
     pub vehicle: VehicleHint,
+    /// What else the file holds, to be written back.
+    pub kept: Kept,
     /// What was read differently from how it may have been meant, a sentence each.
     pub warnings: Vec<String>,
 }
@@ -85,6 +92,8 @@ impl Default for VehicleHint {
 pub struct Fences {
     /// The regions and the return point.
     pub fences: FenceSet,
+    /// What else the file holds about them, to be written back.
+    pub kept: Kept,
     /// What was read differently from how it may have been meant, a sentence each.
     pub warnings: Vec<String>,
 }
@@ -113,7 +122,7 @@ fn read_for(name: &str, bytes: &[u8], want: Want) -> Result<Scenario, FormatErro
 /// # Errors
 /// [`FormatError`] as [`read_scenario`], and where the file holds no region at all.
 pub fn read_fences(name: &str, bytes: &[u8]) -> Result<Fences, FormatError> {
-    let Scenario { mission, fences, mut warnings, .. } = read_for(name, bytes, Want::Fences)?;
+    let Scenario { mission, fences, kept, mut warnings, .. } = read_for(name, bytes, Want::Fences)?;
     if fences.regions.is_empty() {
         let what = "fence or obstacle in it".to_owned();
         let advice = "give a file with polygons or circles";
@@ -125,7 +134,7 @@ pub fn read_fences(name: &str, bytes: &[u8]) -> Result<Fences, FormatError> {
             mission.items.len()
         ));
     }
-    Ok(Fences { fences, warnings })
+    Ok(Fences { fences, kept, warnings })
 }
 
 /// Reads the mission of a file; fences in it are left out.
@@ -146,13 +155,18 @@ fn read(name: &str, bytes: &[u8], want: Want) -> Result<Scenario, Located> {
     if bytes.len() > MAX_FILE_BYTES {
         return Err(Problem::TooLarge { bytes: bytes.len(), limit: MAX_FILE_BYTES }.into());
     }
-    if bytes.starts_with(b"PK\x03\x04") {
-        let what = "this is a ZIP archive, perhaps a KMZ".to_owned();
-        return Err(Problem::NotSupported { what, advice: "unzip it and give the .kml" }.into());
+    if bytes.starts_with(kmz::MAGIC) {
+        let (document, further) = kmz::unpacked(bytes)?;
+        let mut scenario = kml::read(name, text_of(&document)?, want)?;
+        if further > 0 {
+            scenario.warnings.push(format!(
+                "{further} further KML documents in the archive are not read; if there are \
+                 obstacles in them, give each file with --obstacles"
+            ));
+        }
+        return Ok(scenario);
     }
-    let text =
-        std::str::from_utf8(bytes).map_err(|error| Problem::NotText { at: error.valid_up_to() })?;
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let text = text_of(bytes)?;
     let start = text.trim_start();
     if start.starts_with('{') {
         return read_json(name, text, want);
@@ -164,8 +178,16 @@ fn read(name: &str, bytes: &[u8], want: Want) -> Result<Scenario, Located> {
     match first {
         Some(line) if line.starts_with("QGC WPL") => waypoints::read(name, text),
         Some(line) if fence_text::is_position(line) => fence_text::read(name, text),
+        Some(line) if fence_text::is_rally(line) => fence_text::read_rally(text),
         _ => Err(Problem::UnknownFormat.into()),
     }
+}
+
+/// The bytes as text, without a byte order mark.
+fn text_of(bytes: &[u8]) -> Result<&str, Located> {
+    let text =
+        std::str::from_utf8(bytes).map_err(|error| Problem::NotText { at: error.valid_up_to() })?;
+    Ok(text.strip_prefix('\u{feff}').unwrap_or(text))
 }
 
 /// What tells the JSON formats apart; the rest of the document is passed over.

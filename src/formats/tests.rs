@@ -149,12 +149,58 @@ fn every_example_reads_back_from_every_format() {
     }
 }
 
+/// Printable properties under names that no reader knows.
+fn properties() -> impl Strategy<Value = serde_json::Map<String, serde_json::Value>> {
+    let value = prop_oneof![
+        "[ -~é]{0,12}".prop_map(serde_json::Value::from),
+        "(5|true|null|\\[1\\]|-1e3| x )".prop_map(serde_json::Value::from),
+        any::<i32>().prop_map(serde_json::Value::from),
+        any::<bool>().prop_map(serde_json::Value::from),
+        Just(serde_json::json!({"a": [1, null, {"b": "c"}]})),
+    ];
+    prop::collection::btree_map("x-[a-z<&\"]{0,4}|name", value, 0..4)
+        .prop_map(|map| map.into_iter().collect())
+}
+
 proptest! {
+    #[test]
+    fn properties_of_features_are_kept_across_geojson_and_kml(
+        scenario in samples::scenario(),
+        given in properties(),
+    ) {
+        // As if each feature of a file had these properties besides its own.
+        let mut document: serde_json::Value =
+            serde_json::from_str(&write_geojson(&scenario).unwrap()).unwrap();
+        for feature in document["features"].as_array_mut().unwrap() {
+            let own = feature["properties"].as_object_mut().unwrap();
+            own.extend(given.clone());
+        }
+        let read = parse(&document.to_string());
+        assert_same(&read, &scenario, "with properties");
+        let kept = |text: &str| -> Vec<serde_json::Map<String, serde_json::Value>> {
+            let document: serde_json::Value = serde_json::from_str(text).unwrap();
+            let features = document["features"].as_array().unwrap().iter();
+            features.map(|feature| feature["properties"].as_object().unwrap().clone()).collect()
+        };
+        let direct = write_geojson(&read).unwrap();
+        let over_kml = write_geojson(&parse(&write_kml(&read).unwrap())).unwrap();
+        let over_kmz = read_scenario("file", &write_kmz(&read).unwrap()).unwrap();
+        for written in [direct, over_kml, write_geojson(&over_kmz).unwrap()] {
+            for (number, own) in kept(&written).iter().enumerate() {
+                for (key, value) in &given {
+                    prop_assert_eq!(own.get(key), Some(value), "feature {}: {}", number, key);
+                }
+            }
+        }
+    }
+
     #[test]
     fn what_is_written_reads_back_the_same(scenario in samples::scenario()) {
         assert_same(&parse(&write_plan(&scenario).unwrap()), &scenario, ".plan");
         assert_same(&parse(&write_geojson(&scenario).unwrap()), &scenario, ".geojson");
         assert_same(&parse(&write_kml(&scenario).unwrap()), &scenario, ".kml");
+        let kmz = read_scenario("file", &write_kmz(&scenario).unwrap()).unwrap();
+        assert_same(&kmz, &scenario, ".kmz");
         let mission = parse(&write_waypoints(&scenario.mission).unwrap()).mission;
         prop_assert_eq!(text_of(&mission), text_of(&scenario.mission));
         let fences = parse(&write_waypoints_fence(&scenario.fences).unwrap()).fences;
@@ -162,6 +208,15 @@ proptest! {
         prop_assert_eq!(fences.return_point, scenario.fences.return_point);
         let rally = parse(&write_waypoints_rally(&scenario.rally)).rally;
         prop_assert_eq!(text_of(&rally), text_of(&scenario.rally));
+        match write_fence_text(&scenario.fences) {
+            Ok(text) => {
+                let fences = parse(&text).fences;
+                prop_assert_eq!(regions(&fences), regions(&scenario.fences));
+                let place = |fences: &FenceSet| fences.return_point.map(|(place, _)| place);
+                prop_assert_eq!(place(&fences), place(&scenario.fences));
+            }
+            Err(error) => prop_assert!(error.to_string().contains("one inclusion polygon")),
+        }
     }
 
     #[test]
@@ -229,7 +284,6 @@ fn files_of_other_kinds_are_refused_with_what_to_do() {
     assert!(error_of("hello").contains("none of the formats"));
     assert!(error_of("<gpx></gpx>").contains("none of the formats"));
     assert!(error_of("[1,2]").contains("none of the formats"));
-    assert!(error_of("PK\u{3}\u{4}xyz").contains("unzip it"));
     assert!(error_of("QGC WPL 100\n").contains("line 1: the header is"));
     assert!(error_of(r#"{"fileType":"Parameters"}"#).contains("type \"Parameters\""));
     assert!(error_of(r#"{"fileType":"Plan","#).contains("line 1 column"));
@@ -255,4 +309,27 @@ fn fences_alone_are_read_without_the_route_and_must_exist() {
     assert!(error.to_string().contains("no fence or obstacle"));
     let error = read_mission("a.txt", b"47 8\n47 8\n47.1 8\n47.1 8.1\n47 8\n").unwrap_err();
     assert!(error.to_string().contains("no mission"));
+}
+
+#[test]
+fn a_fence_of_one_polygon_with_a_return_point_is_written_as_the_old_text() {
+    let text = "47 8\n47 8\n47.1 8\n47.1 8.1\n47 8\n";
+    let again = write_fence_text(&parse(text).fences).unwrap();
+    assert_eq!(parse(&again), parse(text));
+    assert!(again.starts_with("47.0000000 8.0000000\n"), "{again}");
+    let both = "47 8\n47.1 8\n47.1 8.1\n47 8\n";
+    let error = write_fence_text(&parse(both).fences).unwrap_err().to_string();
+    assert!(error.contains("no return point"), "{error}");
+}
+
+#[test]
+fn old_rally_text_is_read() {
+    let scenario = parse("RALLY 47.5 8.25 40 20 90 1\n# a comment\nRALLY -1 -2 30.5\n");
+    let place = |item: &MissionItem| (item.command.0, item.x, item.y, item.z);
+    let places: Vec<_> = scenario.rally.iter().map(place).collect();
+    assert_eq!(places[0], (5100, 475_000_000, 82_500_000, 40.0));
+    assert_eq!(places[1], (5100, -10_000_000, -20_000_000, 30.5));
+    assert!(
+        error_of("RALLY 47.5 8.25 40\n47 8 9\n").starts_with("file, line 2: this line of rally")
+    );
 }

@@ -2,7 +2,7 @@
 //!
 //! The pure half, which does no I/O: [`device`] is what IBM says about one QPU ([`snapshot`] reads it
 //! from the two REST documents), [`line`](mod@line) the physical qubits a chain is laid on, [`circuit`] native
-//! gates on them, [`lower`] the way from an Ising chain to such a circuit, and `qasm` its text
+//! gates on them, [`lower`](mod@lower) the way from an Ising chain to such a circuit, and `qasm` its text
 //! ([`Circuit::to_qasm`]). Of what was measured, [`mitigation`] takes readout errors out of expectations, and
 //! [`unfolding`] out of the probabilities of bitstrings.
 //!

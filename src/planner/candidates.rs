@@ -134,13 +134,20 @@ fn grid_candidates(
 }
 
 /// A path with as few corners as its length allows, and where that costs little with few enough to
-/// leave some qubits to the refinement.
+/// leave some qubits to the refinement, or at least for one qubit an edge.
 fn with_corners_that_fit(path: &[Xy], space: &LegSpace<'_>, qubits: usize) -> Vec<Xy> {
-    [1.0, 2.0, 4.0]
-        .into_iter()
-        .map(|factor| with_few_corners(path, space, factor * WORTH_OF_FEW))
-        .find(|path| 4 * path.len() <= 3 * qubits + 4)
-        .unwrap_or_else(|| with_few_corners(path, space, WORTH_OF_FEW))
+    let few = |factor: f64| with_few_corners(path, space, factor * WORTH_OF_FEW);
+    let fits = |path: &[Xy]| 4 * path.len() <= 3 * qubits + 4;
+    let all = few(1.0);
+    if fits(&all) {
+        return all;
+    }
+    let fewer = few(2.0);
+    if fits(&fewer) {
+        return fewer;
+    }
+    let fewest = few(4.0);
+    if fewest.len() <= qubits + 1 { fewest } else { all }
 }
 
 /// The shortest path, and then for each gap that it takes a short one with that gap shut.

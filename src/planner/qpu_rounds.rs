@@ -18,7 +18,9 @@ use crate::geodesy::Xy;
 use crate::qaoa::qpu::{
     JobPlan, Measured, Qpu, QpuCircuit, Use, circuits_of_a_step, run_of, train_on_qpu,
 };
-use crate::qaoa::{Angles, AnglesSource, ChainIsing, EngineError, QaoaRun, RunSettings, Scale};
+use crate::qaoa::{
+    Angles, AnglesSource, ChainIsing, EngineError, Objective, QaoaRun, RunSettings, Scale,
+};
 use crate::stop::{Stop, Stopped};
 
 /// The share of the time until the deadline that is kept for the local engine.
@@ -32,7 +34,9 @@ struct Trained {
     pair: Pair,
     chain: ChainIsing,
     angles: Angles,
-    /// ⟨H⟩ of each step, metres.
+    /// What the training lowered, and whether that was estimated from samples.
+    objective: (Objective, bool),
+    /// Its value at each step, metres.
     loss: Vec<f64>,
     loss_errors: Vec<f64>,
     /// ⟨H⟩ at the angles without errors, metres.
@@ -131,7 +135,7 @@ impl Contest<'_> {
             let backend = qpu.used().backend;
             for (one, measured) in trained.into_iter().zip(measured) {
                 let (pair, run, round) = decided(one, measured, &backend, trains);
-                champion = champion.min(self.decide(&pair, run, Some(round), champion, watch));
+                champion = champion.min(self.decide(&pair, run, Some(round), champion, watch).cost);
             }
             let gained = before - self.cost(&self.incumbent);
             idle = if gained > PROGRESS * before { 0 } else { idle + 1 };
@@ -164,7 +168,7 @@ impl Contest<'_> {
         while pairs.len() < circuits
             && let Some(route) = routes.pop_front()
         {
-            pairs.extend(self.pair(Challenger::Route, &self.incumbent, &route)?);
+            pairs.extend(self.pairs_of(Challenger::Route, &self.incumbent, &route)?);
         }
         for _ in 0..PROPOSALS * circuits {
             if pairs.len() >= circuits {
@@ -172,9 +176,11 @@ impl Contest<'_> {
             }
             let moves = moves(&self.incumbent, &self.judge, progress, self.room(), &mut self.rng);
             if moves.from != moves.to {
-                pairs.extend(self.pair(Challenger::Refinement, &moves.from, &moves.to)?);
+                pairs.extend(self.pairs_of(Challenger::Refinement, &moves.from, &moves.to)?);
             }
         }
+        // A long chain is several circuits; a job has no more than it was planned with.
+        pairs.truncate(circuits);
         Ok(pairs)
     }
 
@@ -213,10 +219,15 @@ impl Contest<'_> {
         };
         let run = self.qaoa.run(&pair.ising, &local, stop)?;
         self.angles[kind] = Some(run.angles.clone());
+        let objective = match &losses {
+            None => (run.objective, run.loss_is_sampled),
+            Some(_) => (Objective::Mean, true),
+        };
         let (loss, loss_errors) = losses.unwrap_or((run.loss, Vec::new()));
         Ok(Trained {
             chain,
             angles: run.angles,
+            objective,
             loss,
             loss_errors,
             ideal: run.expectation,
@@ -233,7 +244,9 @@ fn decided(
     backend: &str,
     trained_on_qpu: bool,
 ) -> (Pair, QaoaRun, QpuRound) {
-    let Trained { pair, angles, mut loss, mut loss_errors, ideal, exact_optimum, .. } = trained;
+    let Trained {
+        pair, angles, objective, mut loss, mut loss_errors, ideal, exact_optimum, ..
+    } = trained;
     let scaled = pair.ising.scaled(Scale::Sigma);
     let metres = |energy: f64| scaled.in_input_units(energy);
     let expectation = metres(measured.expectation);
@@ -251,6 +264,89 @@ fn decided(
         ideal_expectation: ideal,
         loss_errors,
     };
-    let run = run_of(&pair.ising, angles, loss, exact_optimum, measured);
+    let mut run = run_of(&pair.ising, angles, loss, exact_optimum, measured);
+    (run.objective, run.loss_is_sampled) = objective;
     (pair, run, round)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planner::{QpuSettings, Settings};
+    use crate::qaoa::qpu::testing::IdealQpu;
+    use crate::qaoa::{EngineChoice, EngineKind};
+    use crate::replan::{Options, Replanned};
+    use crate::report::samples::{POND, planned_on};
+
+    fn options(qpu: QpuSettings) -> Options {
+        let engine = EngineChoice::Only(EngineKind::Ibm);
+        let settings =
+            Settings { qubits: 6, layers: 2, shots: 256, engine, qpu, ..Settings::default() };
+        Options { settings, ..Options::default() }
+    }
+
+    fn engines(result: &Replanned) -> Vec<EngineKind> {
+        let rounds = result.legs.iter().flat_map(|leg| &leg.rounds);
+        let mut engines: Vec<EngineKind> = rounds.map(|round| round.engine).collect();
+        engines.dedup();
+        engines
+    }
+
+    #[test]
+    fn a_mission_is_planned_in_few_jobs_and_nothing_runs_elsewhere() {
+        let mut qpu = IdealQpu::new();
+        let options = options(QpuSettings { jobs: 2, circuits: 3, ..QpuSettings::default() });
+        let result = planned_on(POND, &options, Some(&mut qpu)).unwrap();
+        assert_eq!(engines(&result), [EngineKind::Ibm]);
+        assert_eq!(result.fallback(), None);
+        assert!(result.legs.len() == 2 && qpu.used.jobs <= 4 && qpu.used.circuits <= 12);
+        for round in result.legs.iter().flat_map(|leg| &leg.rounds) {
+            let measured = round.qpu.as_ref().unwrap();
+            let off = (measured.expectation - measured.ideal_expectation).abs();
+            // A bitstring that no shot gave may lack a little besides.
+            assert!(off < 6.0 * measured.standard_error + 0.05, "{measured:?}");
+        }
+    }
+
+    #[test]
+    fn training_on_the_qpu_happens_once_a_leg_and_its_curve_is_kept() {
+        let mut qpu = IdealQpu::new();
+        let training = QpuTraining::Qpu;
+        let options =
+            options(QpuSettings { training, steps: 5, jobs: 1, ..QpuSettings::default() });
+        let result = planned_on(POND, &options, Some(&mut qpu)).unwrap();
+        assert_eq!(qpu.used.jobs, 2 * 6);
+        for leg in &result.legs {
+            let first = &leg.rounds[0];
+            assert_eq!(first.loss.len(), 6);
+            assert_eq!(first.qpu.as_ref().unwrap().loss_errors.len(), 6);
+            assert!(leg.rounds[1..].iter().all(|round| round.loss.len() == 1));
+        }
+    }
+
+    #[test]
+    fn a_qpu_that_fails_is_replaced_and_the_result_says_so() {
+        for fails_after in [0, 1] {
+            let mut qpu = IdealQpu { fails_after, ..IdealQpu::new() };
+            let result =
+                planned_on(POND, &options(QpuSettings::default()), Some(&mut qpu)).unwrap();
+            let said = result.fallback().unwrap();
+            assert!(said.contains("the local engine instead of ideal: out of order"), "{said}");
+            assert!(engines(&result).contains(&EngineKind::Chain));
+        }
+    }
+
+    #[test]
+    fn where_no_fallback_is_allowed_there_is_no_plan() {
+        let mut qpu = IdealQpu { fails_after: 0, ..IdealQpu::new() };
+        let options = options(QpuSettings { fallback: false, ..QpuSettings::default() });
+        let error = planned_on(POND, &options, Some(&mut qpu)).unwrap_err();
+        assert!(error.is_qpu_failure() && !error.is_no_path(), "{error}");
+    }
+
+    #[test]
+    fn the_ibm_engine_without_a_qpu_is_an_error_and_no_simulation() {
+        let error = planned_on(POND, &options(QpuSettings::default()), None).unwrap_err();
+        assert!(error.to_string().contains("the ibm engine is no simulator"), "{error}");
+    }
 }

@@ -4,6 +4,8 @@
 //! distinct bitstring, and keeps the cheapest clean path. The incumbent (the all-zeros string) is
 //! always judged too, so a round never makes the path worse.
 
+use std::ops::Range;
+
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -12,13 +14,13 @@ use super::homotopy::passes_differently;
 use super::moves::moves;
 use super::polyline::{length, simplified};
 use super::settings::{Rounds, Settings};
-use super::stations::aligned;
+use super::stations::{Spare, aligned};
 use super::trellis::{EdgeJudge, Trellis};
 use crate::geodesy::Xy;
 use crate::qaoa::qpu::QpuError;
 use crate::qaoa::{
-    Angles, AnglesSource, Bits, EngineError, EngineKind, Ising, Qaoa, QaoaRun, RunSettings, Scale,
-    Settled, TrainSettings,
+    Angles, AnglesSource, Bits, ChainIsing, EngineChoice, EngineError, EngineKind, Ising,
+    Objective, Qaoa, QaoaRun, RunSettings, Scale, Settled, TrainSettings,
 };
 use crate::stop::{Stop, Stopped};
 
@@ -32,6 +34,15 @@ pub enum Challenger {
     Refinement,
 }
 
+/// A part of a chain. The qubits outside keep the bits that they have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+pub struct Window {
+    /// Its first qubit, from 0.
+    pub first: usize,
+    /// Qubits of the whole chain.
+    pub of: usize,
+}
+
 /// The record of one round. Energies are metres; a collision counts `penalty` in them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Round {
@@ -39,11 +50,17 @@ pub struct Round {
     pub challenger: Challenger,
     /// The engine that ran.
     pub engine: EngineKind,
-    /// Qubits of the chain.
+    /// Qubits of the circuit.
     pub qubits: usize,
+    /// The part of a longer chain that these are, where the engine does not take all of it.
+    pub window: Option<Window>,
     /// Layers of the circuit.
     pub layers: usize,
-    /// ⟨H⟩ at the start of the training and after each step.
+    /// What the training lowered.
+    pub objective: Objective,
+    /// Whether that was estimated from samples at every step.
+    pub loss_is_sampled: bool,
+    /// The objective at the start of the training and after each step.
     pub loss: Vec<f64>,
     /// Distinct bitstrings among the shots.
     pub distinct: usize,
@@ -87,12 +104,42 @@ pub struct QpuRound {
     pub loss_errors: Vec<f64>,
 }
 
-/// Two polylines as a problem.
+/// Two polylines as a problem, or a window of it.
 pub(super) struct Pair {
     pub(super) kind: Challenger,
-    pub(super) trellis: Trellis,
-    pub(super) penalty: f64,
+    trellis: Trellis,
+    penalty: f64,
+    /// All of the trellis.
+    chain: ChainIsing,
+    window: Range<usize>,
+    /// The bits of the whole chain, of which those outside the window stay.
+    held: Bits,
+    /// The problem of the window.
     pub(super) ising: Ising,
+}
+
+impl Pair {
+    /// The same window with other bits outside.
+    fn holding(self, held: Bits) -> Self {
+        let ising = match self.chain.window(self.window.clone(), &held) {
+            Some(problem) => problem.into(),
+            None => self.ising,
+        };
+        Self { held, ising, ..self }
+    }
+
+    /// The bits of the whole chain with those of a window's sample.
+    fn whole(&self, sample: &Bits) -> Bits {
+        let mut whole = self.held.clone();
+        sample.iter().zip(self.window.clone()).for_each(|(bit, qubit)| whole.set(qubit, bit));
+        whole
+    }
+}
+
+/// The better of staying and the cheapest sample of a round.
+pub(super) struct Decided {
+    pub(super) cost: f64,
+    bits: Bits,
 }
 
 /// Why the rounds ended without a result.
@@ -139,7 +186,21 @@ pub(super) const PROGRESS: f64 = 5e-5;
 const STRAIGHT: f64 = 1e-3;
 
 /// Steps of a training that starts from the angles of an earlier round.
-const CARRIED_STEPS: usize = 16;
+const CARRIED_STEPS: usize = 24;
+
+/// When such a training has settled.
+const CARRIED_SETTLED: Option<Settled> = Some(Settled { window: 4, tolerance: 3e-3 });
+
+/// Steps between two windows, as a share of their width: they overlap by half.
+const WINDOWS_OVERLAP: usize = 2;
+
+/// Windows of at most `most` qubits over a chain, from its start to its end.
+fn windows(qubits: usize, most: usize) -> Vec<Range<usize>> {
+    let width = most.clamp(1, qubits.max(1));
+    let step = (width / WINDOWS_OVERLAP).max(1);
+    let last = qubits - width.min(qubits);
+    (0..last).step_by(step).chain([last]).map(|first| first..first + width).collect()
+}
 
 /// The incumbent with all that the rounds share.
 pub struct Contest<'a> {
@@ -211,6 +272,9 @@ impl<'a> Contest<'a> {
         others: &[Candidate],
         mut watch: impl FnMut(&Round),
     ) -> Result<Contested, RoundError> {
+        if self.settings.engine == EngineChoice::Only(EngineKind::Ibm) {
+            return Err(EngineError::NoQpu.into());
+        }
         let cut_short = match self.all_rounds(others, &mut watch) {
             Ok(()) => false,
             Err(RoundError::Stopped(Stopped::DeadlinePassed)) => true,
@@ -306,7 +370,8 @@ impl<'a> Contest<'a> {
         self.settings.qubits + 1
     }
 
-    /// One round between two polylines with the same ends.
+    /// One round between two polylines with the same ends; where the engine does not take the whole
+    /// chain, one for each window, each with the bits that those before it have found.
     fn round(
         &mut self,
         kind: Challenger,
@@ -318,30 +383,55 @@ impl<'a> Contest<'a> {
         if self.rounds.len() >= self.budget {
             return Ok(());
         }
-        let Some(pair) = self.pair(kind, &from, &to)? else { return Ok(()) };
-        let settings = self.run_settings(kind);
-        let run = self.qaoa.run(&pair.ising, &settings, self.stop)?;
-        self.angles[kind as usize] = Some(run.angles.clone());
-        self.decide(&pair, run, None, f64::INFINITY, watch);
+        // Each window holds the bits that those before it have found.
+        let mut held = None;
+        for mut pair in self.pairs_of(kind, &from, &to)? {
+            if self.rounds.len() >= self.budget {
+                break;
+            }
+            if let Some(held) = held.take() {
+                pair = pair.holding(held);
+            }
+            let settings = self.run_settings(kind);
+            let run = self.qaoa.run(&pair.ising, &settings, self.stop)?;
+            self.angles[kind as usize] = Some(run.angles.clone());
+            held = Some(self.decide(&pair, run, None, f64::INFINITY, watch).bits);
+        }
         Ok(())
     }
 
-    /// Two polylines as a problem; `None` for a path without length, where nothing is to contest.
-    pub(super) fn pair(
+    /// Two polylines as problems: one, or where the engine does not take the whole chain one for each
+    /// window that has something to decide. None for a path without length.
+    pub(super) fn pairs_of(
         &self,
         kind: Challenger,
         from: &[Xy],
         to: &[Xy],
-    ) -> Result<Option<Pair>, RoundError> {
-        let Some((a, b)) = aligned(from, to, self.settings.qubits) else { return Ok(None) };
+    ) -> Result<Vec<Pair>, RoundError> {
+        let spare = if self.settings.full_training { Spare::Along } else { Spare::Alike };
+        let Some((a, b)) = aligned(from, to, self.settings.qubits, spare) else {
+            return Ok(Vec::new());
+        };
         let trellis = Trellis::new(a, b, &self.judge);
         let penalty = trellis.penalty();
-        let ising: Ising = trellis.ising(penalty)?.into();
-        Ok(Some(Pair { kind, trellis, penalty, ising }))
+        let chain = trellis.ising(penalty)?;
+        let most = self.settings.engine.most_qubits(self.settings.qubits);
+        let windows = windows(trellis.qubits(), most);
+        let only = windows.len() == 1;
+        let held = Bits::zeros(trellis.qubits());
+        Ok(windows
+            .into_iter()
+            .filter(|window| only || !trellis.is_idle(window.clone()))
+            .filter_map(|window| {
+                let ising = chain.window(window.clone(), &held)?.into();
+                let (trellis, chain, held) = (trellis.clone(), chain.clone(), held.clone());
+                Some(Pair { kind, trellis, penalty, chain, window, held, ising })
+            })
+            .collect())
     }
 
     /// Judges every sample of a run; the cheapest path is the incumbent if it is cheaper than staying
-    /// and than `champion`. Gives the cost of the cheapest.
+    /// and than `champion`.
     pub(super) fn decide(
         &mut self,
         pair: &Pair,
@@ -349,41 +439,42 @@ impl<'a> Contest<'a> {
         qpu: Option<QpuRound>,
         champion: f64,
         watch: &mut impl FnMut(&Round),
-    ) -> f64 {
+    ) -> Decided {
         let trellis = &pair.trellis;
-        let zeros = Bits::zeros(trellis.qubits());
         let cost = |bits: &Bits| trellis.path_edges(bits).map(|edge| edge.cost()).sum::<f64>();
-        let stay = cost(&zeros);
+        let stay = Decided { cost: cost(&pair.held), bits: pair.held.clone() };
         let best = run
             .samples
             .iter()
-            .map(|sample| (cost(&sample.bits), &sample.bits))
-            .min_by(|x, y| x.0.total_cmp(&y.0));
-        let improved = best.is_some_and(|(cost, _)| cost < stay.min(champion) - 1e-9);
-        let chosen = match best {
-            Some((_, bits)) if improved => Some(trellis.decode(bits)),
-            // Without an earlier champion the incumbent is what this pair made of it.
-            _ if champion.is_infinite() => Some(trellis.decode(&zeros)),
-            _ => None,
-        };
-        let space = self.judge.space;
-        if let Some(chosen) = chosen {
+            .map(|sample| pair.whole(&sample.bits))
+            .map(|bits| Decided { cost: cost(&bits), bits })
+            .min_by(|x, y| x.cost.total_cmp(&y.cost))
+            .filter(|best| best.cost < stay.cost - 1e-9);
+        let improved = best.as_ref().is_some_and(|best| best.cost < champion - 1e-9);
+        let best = best.unwrap_or(stay);
+        // Without an earlier champion the incumbent is what this pair made of it.
+        if improved || champion.is_infinite() {
+            let space = self.judge.space;
+            let chosen = trellis.decode(&best.bits);
             self.incumbent = simplified(&chosen, STRAIGHT, |a, b| space.is_clear(a, b));
         }
 
-        let best_sample = run.best.as_ref().map_or(f64::INFINITY, |best| best.energy);
         let (exact_optimum, gap, p_optimum) = match &run.certificate {
             Some(c) => (c.exact_optimum, c.gap.unwrap_or(f64::INFINITY), c.p_optimum),
             None => (f64::NAN, f64::NAN, f64::NAN),
         };
+        let part = pair.window.len() < trellis.qubits();
         let round = Round {
             challenger: pair.kind,
             engine: run.engine,
             qubits: run.qubits,
+            window: part.then_some(Window { first: pair.window.start, of: trellis.qubits() }),
             layers: run.angles.layers(),
+            objective: run.objective,
+            loss_is_sampled: run.loss_is_sampled,
             loss: run.loss,
             distinct: run.samples.len(),
-            best_sample,
+            best_sample: run.best.as_ref().map_or(f64::INFINITY, |best| best.energy),
             exact_optimum,
             gap,
             p_optimum,
@@ -395,24 +486,29 @@ impl<'a> Contest<'a> {
         };
         watch(&round);
         self.rounds.push(round);
-        best.map_or(stay, |(cost, _)| cost).min(stay)
+        best
     }
 
     pub(super) fn run_settings(&mut self, kind: Challenger) -> RunSettings {
         let settings = self.settings;
+        let objective = match settings.cvar {
+            None => Objective::Mean,
+            Some(alpha) => {
+                Objective::Cvar { alpha, shots: settings.shots, seed: self.rng.random() }
+            }
+        };
         let full = TrainSettings {
             steps: settings.steps,
             learning_rate: settings.learning_rate,
             settled: None,
+            objective,
         };
         let (angles, train) = match &self.angles[kind as usize] {
-            Some(angles) if !settings.full_training => {
-                let settled = Some(Settled { window: 3, tolerance: 1e-2 });
+            // The trellises of different routes have little in common: each is trained in full.
+            Some(angles) if kind == Challenger::Refinement && !settings.full_training => {
                 let steps = settings.steps.min(CARRIED_STEPS);
-                (
-                    AnglesSource::CarriedOver(angles.clone()),
-                    TrainSettings { steps, settled, ..full },
-                )
+                let carried = AnglesSource::CarriedOver(angles.clone());
+                (carried, TrainSettings { steps, settled: CARRIED_SETTLED, ..full })
             }
             _ => (AnglesSource::Ramp(settings.layers), full),
         };
@@ -424,5 +520,20 @@ impl<'a> Contest<'a> {
             shots: settings.shots,
             seed: self.rng.random(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::windows;
+
+    #[test]
+    fn windows_cover_the_chain_and_overlap() {
+        for most in [20, usize::MAX] {
+            assert_eq!(windows(20, most), vec![0..20; 1]);
+        }
+        assert_eq!(windows(21, 20), [0..20, 1..21]);
+        assert_eq!(windows(33, 8), [0..8, 4..12, 8..16, 12..20, 16..24, 20..28, 24..32, 25..33]);
+        assert_eq!(windows(3, 1), [0..1, 1..2, 2..3]);
     }
 }

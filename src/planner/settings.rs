@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::finish::WORTH_OF_FEW;
 use crate::qaoa::EngineChoice;
 use crate::units::Metres;
 
@@ -91,7 +92,7 @@ impl std::str::FromStr for QpuTraining {
 }
 
 /// How a leg is planned on a QPU.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct QpuSettings {
     /// Where angles are trained.
     pub training: QpuTraining,
@@ -125,6 +126,8 @@ pub struct Settings {
     pub steps: usize,
     /// Adam's learning rate (paper: 0.1).
     pub learning_rate: f64,
+    /// Train on the mean of this share of the best measurements instead of ⟨H⟩ (CVaR).
+    pub cvar: Option<f64>,
     /// Shots of each run.
     pub shots: u32,
     /// QAOA runs for each leg.
@@ -144,6 +147,9 @@ pub struct Settings {
     /// Whether every round is trained in full from the ramp, as in the paper. Else only the first
     /// is, and later ones carry the angles over and stop when the loss has settled.
     pub full_training: bool,
+    /// What the waypoints that are saved by merging corners may cost together, as a share of a
+    /// leg's length.
+    pub corner_allowance: f64,
     /// Memory that an engine may use, bytes.
     pub memory_limit: u64,
     /// What is different on a QPU.
@@ -158,6 +164,7 @@ impl Default for Settings {
             layers: 5,
             steps: 60,
             learning_rate: 0.1,
+            cvar: None,
             shots: 1024,
             rounds: Rounds::Auto,
             seed: 0,
@@ -167,6 +174,7 @@ impl Default for Settings {
             lambda: Metres(0.05),
             engine: EngineChoice::Auto,
             full_training: false,
+            corner_allowance: WORTH_OF_FEW,
             memory_limit: 4 << 30,
             qpu: QpuSettings::default(),
         }

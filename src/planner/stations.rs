@@ -10,6 +10,17 @@ use crate::geodesy::Xy;
 /// Vertices of two polylines this near to each other are the same, metres.
 const SAME: f64 = 1e-6;
 
+/// Where stations go that no vertex needs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Spare {
+    /// Along the edges, as in the paper.
+    Along,
+    /// Where the two polylines are alike and nothing has to be decided: to the edges that they have
+    /// in common, or else to the start. A choice between stations that make next to no difference
+    /// would only hide from QAOA those that do.
+    Alike,
+}
+
 /// The `edges + 1` stations of a polyline: its vertices, and points between them so that the
 /// edges are of about equal length. `None` where it has more edges than asked for.
 #[must_use]
@@ -44,12 +55,12 @@ pub fn stations(path: &[Xy], edges: usize) -> Option<Vec<Xy>> {
 
 /// The stations of two polylines with the same ends, at least `edges` edges each. Where both have
 /// a vertex in common it is the same station of both, and what is between two of these has the
-/// same number of edges, unless this would take more than `edges`. The stations that no vertex needs go to the edges that both have in
-/// common; there the two are alike and nothing has to be decided.
+/// same number of edges, unless this would take more than `edges`. Where the stations go that no
+/// vertex needs is for `spare` to say.
 ///
 /// `None` where one of the polylines is no line.
 #[must_use]
-pub fn aligned(one: &[Xy], other: &[Xy], edges: usize) -> Option<(Vec<Xy>, Vec<Xy>)> {
+pub fn aligned(one: &[Xy], other: &[Xy], edges: usize, spare: Spare) -> Option<(Vec<Xy>, Vec<Xy>)> {
     if one.len() < 2 || other.len() < 2 {
         return None;
     }
@@ -64,7 +75,15 @@ pub fn aligned(one: &[Xy], other: &[Xy], edges: usize) -> Option<(Vec<Xy>, Vec<X
         return Some((stations(one, edges)?, stations(other, edges)?));
     }
     let any_shared = (0..sections.len()).any(shared);
-    for _ in counts.iter().sum()..edges {
+    let needed = counts.iter().sum::<usize>().min(edges);
+    if spare == Spare::Alike && !any_shared && needed < edges {
+        let mut aligned = aligned(one, other, needed, spare)?;
+        for line in [&mut aligned.0, &mut aligned.1] {
+            line.splice(0..0, std::iter::repeat_n(line[0], edges - needed));
+        }
+        return Some(aligned);
+    }
+    for _ in needed..edges {
         // The section with the longest edges gets one more.
         let longest =
             (0..sections.len()).filter(|&k| !any_shared || shared(k)).max_by(|&j, &k| {
@@ -134,6 +153,18 @@ mod tests {
         for (i, station) in cut.iter().enumerate() {
             assert!((station.x - 5.0 * i as f64).abs() < 1e-9);
         }
+    }
+
+    #[test]
+    fn stations_that_nothing_needs_decide_nothing() {
+        let at = |x: f64, y: f64| Xy { x, y };
+        let (one, other) = ([at(0., 0.), at(50., 30.), at(100., 0.)], [at(0., 0.), at(100., 0.)]);
+        let (a, b) = aligned(&one, &other, 6, Spare::Alike).unwrap();
+        assert_eq!((a.len(), b.len()), (7, 7));
+        assert_eq!((a[..5].to_vec(), b[..5].to_vec()), (vec![one[0]; 5], vec![one[0]; 5]));
+        assert_eq!((a[5], b[5]), (one[1], at(50., 0.)));
+        let (a, b) = aligned(&one, &other, 6, Spare::Along).unwrap();
+        assert!(a.iter().zip(&b).skip(1).take(5).all(|(a, b)| a != b));
     }
 
     proptest! {

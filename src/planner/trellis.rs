@@ -124,6 +124,12 @@ impl Trellis {
         })
     }
 
+    /// Whether none of the qubits in a range has anything to decide.
+    #[must_use]
+    pub fn is_idle(&self, mut qubits: std::ops::Range<usize>) -> bool {
+        qubits.all(|i| self.incumbent[i] == self.challenger[i])
+    }
+
     /// The stations of the path that a bitstring stands for.
     #[must_use]
     pub fn decode(&self, bits: &Bits) -> Vec<Xy> {

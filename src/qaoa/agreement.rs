@@ -188,3 +188,69 @@ fn what_an_engine_cannot_do_is_an_error_with_the_figure() {
         Err(EngineError::Memory { qubits: 40, needed: 35_184_388_866_048, .. })
     ));
 }
+
+/// The lowest share `alpha` of a distribution, by its definition.
+fn cvar_by_sorting(engine: &mut dyn Engine, ising: &Ising, angles: &Angles, alpha: f64) -> f64 {
+    let n = ising.qubits();
+    let mut states: Vec<(f64, f64)> = (0..1 << n)
+        .map(|index| Bits::from_index(n, index))
+        .map(|bits| (ising.energy(&bits), engine.probability(angles, &bits).unwrap()))
+        .collect();
+    states.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (mut left, mut sum) = (alpha, 0.0);
+    for (energy, probability) in states {
+        let taken = probability.min(left);
+        sum += taken * energy;
+        left -= taken;
+    }
+    sum / alpha
+}
+
+#[test]
+fn cvar_from_amplitudes_follows_its_definition_and_its_gradient_finite_differences() {
+    let ising = Ising::from(frustrated_chain());
+    let rng = &mut ChaCha8Rng::seed_from_u64(1);
+    let angles = Angles::ramp(3);
+    for (precision, close) in [(Precision::Double, 1e-9), (Precision::Single, 1e-4)] {
+        let mut engine = StatevectorEngine::new(&ising, precision, MEMORY).unwrap();
+        for alpha in [0.03, 0.25, 1.0] {
+            let mut cvar =
+                |angles: &Angles| engine.cvar_and_gradient(angles, alpha, 0, rng).unwrap();
+            let (value, gradient) = cvar(&angles);
+            if precision == Precision::Double {
+                for (k, slope) in gradient.iter().enumerate() {
+                    let mut at = |step: f64| {
+                        let mut moved = angles.clone();
+                        moved.iter_mut().skip(k).take(1).for_each(|angle| *angle += step);
+                        cvar(&moved).0
+                    };
+                    let difference = (at(1e-5) - at(-1e-5)) / 2e-5;
+                    assert!((slope - difference).abs() < 1e-5, "{alpha} {k} {slope} {difference}");
+                }
+            }
+            let exact = cvar_by_sorting(&mut engine, &ising, &angles, alpha);
+            assert!((value - exact).abs() < close, "{alpha} {value} {exact}");
+        }
+        let (all, slopes) = engine.cvar_and_gradient(&angles, 1.0, 0, rng).unwrap();
+        let (mean, plain) = engine.expectation_and_gradient(&angles).unwrap();
+        assert!((all - mean).abs() < close);
+        assert!(slopes.iter().zip(plain.iter()).all(|(a, b)| (a - b).abs() < 10.0 * close));
+    }
+}
+
+#[test]
+fn cvar_from_samples_comes_near_to_the_exact_one() {
+    let (mut exact, mut amplitudes) = engines(&frustrated_chain());
+    let rng = &mut ChaCha8Rng::seed_from_u64(6);
+    for layers in [2, 4] {
+        let angles = Angles::ramp(layers);
+        for alpha in [0.1, 0.5] {
+            let (value, gradient) = amplitudes.cvar_and_gradient(&angles, alpha, 0, rng).unwrap();
+            let (estimate, slopes) = exact.cvar_and_gradient(&angles, alpha, 400_000, rng).unwrap();
+            assert!((value - estimate).abs() < 0.01, "{value} {estimate}");
+            for (a, b) in gradient.iter().zip(slopes.iter()) {
+                assert!((a - b).abs() < 0.05, "{layers} {alpha}: {gradient:?} {slopes:?}");
+            }
+        }
+    }
+}

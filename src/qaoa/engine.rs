@@ -42,6 +42,18 @@ pub enum EngineChoice {
     Only(EngineKind),
 }
 
+impl EngineChoice {
+    /// The most qubits of one run where a chain has more than `preferred`: `chain` is linear in their
+    /// number and takes any; on others a window of `preferred` qubits slides along.
+    #[must_use]
+    pub fn most_qubits(self, preferred: usize) -> usize {
+        match self {
+            Self::Auto | Self::Only(EngineKind::Chain) => usize::MAX,
+            Self::Only(_) => preferred,
+        }
+    }
+}
+
 /// A name that is no engine.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("there is no engine {0:?}; choose auto, chain, statevector or ibm")]
@@ -161,6 +173,23 @@ pub trait Engine {
     /// # Errors
     /// If the circuit has too many layers or does not fit into memory.
     fn expectation_and_gradient(&mut self, angles: &Angles) -> Result<(f64, Angles), EngineError>;
+
+    /// The CVaR objective and its derivatives: the mean energy of the best share `alpha` (above 0, at
+    /// most 1) of all measurements. Exact where [`Engine::cvar_is_exact`] says so, and else estimated
+    /// from `shots` samples as the module [`super::cvar`] defines it.
+    ///
+    /// # Errors
+    /// If the circuit has too many layers or does not fit into memory.
+    fn cvar_and_gradient(
+        &mut self,
+        angles: &Angles,
+        alpha: f64,
+        shots: u32,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<(f64, Angles), EngineError>;
+
+    /// Whether CVaR is exact, without samples.
+    fn cvar_is_exact(&self) -> bool;
 
     /// Measures every qubit `shots` times; distinct bitstrings in ascending order. The same `rng` state
     /// gives the same samples.

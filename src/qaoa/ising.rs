@@ -3,6 +3,7 @@
 //! sees.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use thiserror::Error;
 
@@ -306,6 +307,32 @@ impl ChainIsing {
     pub fn qubits(&self) -> usize {
         self.h.len()
     }
+
+    /// The problem of some neighbouring qubits while all others hold the bits of `held`: energies are
+    /// those of the whole chain. `None` for a range without qubits of the chain, or bits of another
+    /// length.
+    #[must_use]
+    pub fn window(&self, range: Range<usize>, held: &Bits) -> Option<Self> {
+        let (first, end) = (range.start, range.end);
+        if first >= end || end > self.qubits() || held.len() != self.qubits() {
+            return None;
+        }
+        let outside = |i: &usize| !range.contains(i);
+        let fields = (0..self.qubits()).filter(outside).map(|i| self.h[i] * held.z(i));
+        let bonds = (0..self.j.len())
+            .filter(|i| outside(i) && outside(&(i + 1)))
+            .map(|i| self.j[i] * held.z(i) * held.z(i + 1));
+        let constant = self.constant + fields.sum::<f64>() + bonds.sum::<f64>();
+        let mut h = self.h[range.clone()].to_vec();
+        let last = h.len() - 1;
+        if first > 0 {
+            h[0] += self.j[first - 1] * held.z(first - 1);
+        }
+        if end < self.qubits() {
+            h[last] += self.j[end - 1] * held.z(end);
+        }
+        Some(Self { constant, h, j: self.j[first..end - 1].to_vec() })
+    }
 }
 
 impl From<ChainIsing> for Ising {
@@ -322,6 +349,26 @@ mod tests {
 
     fn triangle() -> Ising {
         Ising::new(1.0, vec![0.5, -1.0, 2.0], vec![(0, 1, 1.0), (2, 1, 3.0), (1, 2, -1.0)]).unwrap()
+    }
+
+    #[test]
+    fn a_window_has_the_energies_of_the_whole_chain() {
+        let h = vec![0.3, -1.0, 0.7, 0.2, -0.4, 1.1];
+        let chain = ChainIsing::new(2.0, h, vec![0.5, -0.2, 0.9, -1.3, 0.4]).unwrap();
+        let whole = Ising::from(chain.clone());
+        let held = Bits::from_index(6, 0b101101);
+        for first in 0..6 {
+            for end in first + 1..=6 {
+                let window = Ising::from(chain.window(first..end, &held).unwrap());
+                for inner in 0..1 << (end - first) {
+                    let inner = Bits::from_index(end - first, inner);
+                    let mut bits = held.clone();
+                    inner.iter().enumerate().for_each(|(k, bit)| bits.set(first + k, bit));
+                    assert!((window.energy(&inner) - whole.energy(&bits)).abs() < 1e-12);
+                }
+            }
+        }
+        assert!(chain.window(2..2, &held).is_none() && chain.window(2..7, &held).is_none());
     }
 
     #[test]

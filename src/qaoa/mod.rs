@@ -9,6 +9,7 @@ pub mod adam;
 pub mod angles;
 pub mod bits;
 pub mod chain;
+pub mod cvar;
 pub mod engine;
 pub mod ising;
 pub mod qpu;
@@ -23,7 +24,7 @@ pub use bits::Bits;
 pub use engine::{EngineChoice, EngineError, EngineKind};
 pub use ising::{ChainIsing, Ising, IsingError, Scale};
 pub use run::{AnglesSource, Qaoa, QaoaRun, RunSettings};
-pub use train::{Settled, TrainSettings};
+pub use train::{Objective, Settled, TrainSettings};
 
 #[cfg(test)]
 mod agreement;

@@ -10,7 +10,7 @@ use super::chain::ChainEngine;
 use super::engine::{Engine, EngineChoice, EngineError, EngineKind, Sample};
 use super::ising::{Ising, Scale};
 use super::statevector::{Precision, StatevectorEngine};
-use super::train::{TrainSettings, Training, train};
+use super::train::{Objective, TrainSettings, Training, train};
 use super::viterbi::exact_optimum;
 use crate::stop::Stop;
 
@@ -89,7 +89,11 @@ pub struct QaoaRun {
     pub angles: Angles,
     /// ⟨H⟩ at those angles.
     pub expectation: f64,
-    /// ⟨H⟩ at the start of the training and after each step; one value without training.
+    /// What the training lowered.
+    pub objective: Objective,
+    /// Whether that was estimated from samples at every step.
+    pub loss_is_sampled: bool,
+    /// The objective at the start of the training and after each step; one value without training.
     pub loss: Vec<f64>,
     /// ∂⟨H⟩/∂angles, for given angles only.
     pub gradient: Option<Angles>,
@@ -148,10 +152,18 @@ impl Qaoa {
                 let (expectation, mut slopes) = engine.expectation_and_gradient(angles)?;
                 slopes.iter_mut().for_each(|slope| *slope *= scaled.factor);
                 gradient = Some(slopes);
-                Training { angles: angles.clone(), expectation, loss: vec![expectation] }
+                Training { angles: angles.clone(), lowest: expectation, loss: vec![expectation] }
             }
         };
-        let Training { angles, expectation, loss } = training;
+        let Training { angles, lowest, loss } = training;
+        let objective = match settings.angles {
+            AnglesSource::Given(_) => Objective::Mean,
+            _ => settings.train.objective,
+        };
+        let (expectation, loss_is_sampled) = match objective {
+            Objective::Mean => (lowest, false),
+            Objective::Cvar { .. } => (engine.expectation(&angles)?, !engine.cvar_is_exact()),
+        };
         let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
         let samples = engine.sample(&angles, settings.shots, &mut rng)?;
         let best = samples
@@ -180,6 +192,8 @@ impl Qaoa {
             qubits: ising.qubits(),
             angles,
             expectation: scaled.in_input_units(expectation),
+            objective,
+            loss_is_sampled,
             loss: loss.into_iter().map(|energy| scaled.in_input_units(energy)).collect(),
             gradient,
             samples,

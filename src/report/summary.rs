@@ -3,9 +3,8 @@
 use super::run::Run;
 use super::stretch::stretches;
 use super::text::{
-    Table, change, clearance, count, duration, finding, leg_label, push_wrapped, unbroken,
+    Table, best_gap, change, clearance, count, duration, finding, leg_label, push_wrapped, unbroken,
 };
-use crate::planner::rounds::Round;
 use crate::qaoa::qpu::QpuUse;
 use crate::replan::{LegRecord, LegVerdict, Replanned, Verdict};
 use crate::units::Metres;
@@ -102,15 +101,6 @@ fn leg_table(result: &Replanned) -> Table {
         ]);
     }
     table
-}
-
-/// How near the best sample of any round came to the exact optimum of its chain.
-fn best_gap(rounds: &[Round]) -> String {
-    let gaps = rounds.iter().map(|round| round.gap).filter(|gap| gap.is_finite());
-    match gaps.reduce(f64::min) {
-        None => "-".to_owned(),
-        Some(gap) => format!("{:.2} m", (gap - 1e-9).max(0.0)),
-    }
 }
 
 fn time(record: &LegRecord) -> String {

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use crate::mission::Leg;
 use crate::mission::legs::{LegKind, ReturnTo, number as item_number};
+use crate::planner::rounds::Round;
 use crate::replan::LegVerdict;
 use crate::units::Metres;
 
@@ -65,6 +66,17 @@ pub(super) fn unbroken(metres: Metres) -> String {
 pub(super) fn change(from: Metres, to: Metres) -> String {
     let share = (to / from - 1.0) * 100.0;
     if share.is_finite() { format!("{share:+.1} %") } else { "-".to_owned() }
+}
+
+/// How near the best sample of any round came to the exact optimum of its chain.
+pub(super) fn best_gap(rounds: &[Round]) -> String {
+    let gaps = rounds.iter().map(|round| round.gap).filter(|gap| gap.is_finite());
+    gaps.reduce(f64::min).map_or_else(|| "-".to_owned(), metres_above)
+}
+
+/// A gap in metres; `-` where it is not known.
+pub(super) fn metres_above(gap: f64) -> String {
+    if gap.is_finite() { format!("{:.2} m", (gap - 1e-9).max(0.0)) } else { "-".to_owned() }
 }
 
 /// A duration in at most five characters and a unit.

@@ -34,12 +34,6 @@ fn a_plan_that_is_cut_short_is_clear_and_says_so() {
     assert!(document["min_clearance_m"].as_f64().unwrap() >= 4.99);
     let fallback = document["fallback"].as_str().unwrap();
     assert!(fallback.starts_with("the deadline passed: the leg from item"), "{fallback}");
-    // Every leg that is re-planned had its share of the time.
-    let legs = document["legs"].as_array().unwrap();
-    let replanned = legs.iter().filter(|leg| leg["replanned"] == true);
-    let rounds: Vec<usize> = replanned.map(|leg| leg["rounds"].as_array().unwrap().len()).collect();
-    assert!(rounds.len() > 1 && rounds.iter().all(|&rounds| rounds > 0), "{rounds:?}");
-
     let output = planned("inclusion-with-hole", &cut);
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(text.contains("fallback: the deadline passed"), "{text}");

@@ -147,7 +147,8 @@ fn training_time(ising: &Ising, settings: &Settings) -> Result<Duration, CliErro
     };
     let mut engine = ChainEngine::new(chain, settings.memory_limit);
     let steps = settings.steps;
-    let how = TrainSettings { steps, learning_rate: settings.learning_rate, settled: None };
+    let how =
+        TrainSettings { steps, learning_rate: settings.learning_rate, ..TrainSettings::default() };
     let mut failure = None;
     let time = fastest(|| {
         if let Err(error) = train(&mut engine, Angles::ramp(settings.layers), &how, &Stop::new()) {

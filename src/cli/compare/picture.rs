@@ -41,7 +41,13 @@ pub fn loss_curves(scenarios: &[ScenarioResult]) -> String {
         .set("viewBox", (0.0, 0.0, WIDTH, HEIGHT))
         .set("font-family", "sans-serif")
         .set("font-size", 13)
-        .add(Rectangle::new().set("width", WIDTH).set("height", HEIGHT).set("fill", "#fff"))
+        .add(
+            Rectangle::new()
+                .set("width", WIDTH)
+                .set("height", HEIGHT)
+                .set("fill", "#fff")
+                .set("class", "plot"),
+        )
         .add(label("QAOA loss above the exact optimum, first training", LEFT, TOP - 18.0, "start"))
         .add(label("Adam step", f64::midpoint(LEFT, RIGHT), HEIGHT - 12.0, "middle"));
     for tick in 0..=4 {
@@ -104,6 +110,9 @@ mod tests {
         let round = RoundDocument {
             challenger: Challenger::Route,
             engine: "chain".into(),
+            window: None,
+            objective: "mean".to_owned(),
+            loss_is_sampled: false,
             qubits: 20,
             layers: 5,
             loss: loss.to_vec(),

@@ -93,7 +93,7 @@ pub(super) fn run(args: &RunArgs) -> Result<String, CliError> {
             Some(trained) => AnglesSource::Given(trained.angles.clone()),
             None => AnglesSource::Ramp(layers),
         },
-        train: TrainSettings { steps, learning_rate: rate, settled: None },
+        train: TrainSettings { steps, learning_rate: rate, ..TrainSettings::default() },
         shots: 0,
         ..RunSettings::default()
     };

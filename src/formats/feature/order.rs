@@ -3,6 +3,7 @@
 use super::properties::Role;
 use crate::formats::error::{Located, Place, Problem};
 use crate::formats::item::{FileItem, index_in, jumps_to_indices};
+use crate::formats::kept::Properties;
 use crate::geodesy::LatLon;
 use crate::mission::MissionItem;
 
@@ -13,6 +14,7 @@ pub(super) struct RoutePoint {
     pub(super) role: Role,
     pub(super) seq: Option<u16>,
     pub(super) altitude: f32,
+    pub(super) properties: Properties,
 }
 
 /// A mission item of the file, before the mission is in order.
@@ -20,9 +22,13 @@ pub(super) struct NumberedItem {
     pub(super) place: Place,
     pub(super) seq: u16,
     pub(super) item: FileItem,
+    pub(super) properties: Properties,
 }
 
-pub(super) fn ordered_items(mut items: Vec<NumberedItem>) -> Result<Vec<MissionItem>, Located> {
+/// The items in order, each with its properties.
+pub(super) fn ordered_items(
+    mut items: Vec<NumberedItem>,
+) -> Result<Vec<(MissionItem, Properties)>, Located> {
     items.sort_by_key(|item| item.seq);
     for (index, item) in items.iter().enumerate() {
         if usize::from(item.seq) != index {
@@ -42,12 +48,11 @@ pub(super) fn ordered_items(mut items: Vec<NumberedItem>) -> Result<Vec<MissionI
     jumps_to_indices(&mut mission, index_of).map_err(|(index, problem)| {
         problem.at(items.get(index).map_or(Place::File, |item| item.place.clone()))
     })?;
-    Ok(mission)
+    Ok(mission.into_iter().zip(items.into_iter().map(|item| item.properties)).collect())
 }
 
-pub(super) fn ordered_points(
-    mut points: Vec<RoutePoint>,
-) -> Result<Vec<(Place, LatLon, f32)>, Located> {
+/// The points in order.
+pub(super) fn ordered_points(mut points: Vec<RoutePoint>) -> Result<Vec<RoutePoint>, Located> {
     if points.iter().any(|point| point.seq.is_some()) {
         if let Some(point) = points.iter().find(|point| point.seq.is_none()) {
             let what = "seq, though other points of the route have one".to_owned();
@@ -78,5 +83,5 @@ pub(super) fn ordered_points(
             return Err(Problem::Conflict { what, advice }.at(point.place.clone()));
         }
     }
-    Ok(points.into_iter().map(|point| (point.place, point.position, point.altitude)).collect())
+    Ok(points)
 }

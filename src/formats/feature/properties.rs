@@ -143,7 +143,8 @@ pub(super) fn numbered_item(feature: &Feature) -> Result<NumberedItem, Problem> 
         autocontinue: autocontinue.unwrap_or(true),
     };
     let seq = natural(needed("seq")?, u16::MAX - 1, "seq")?;
-    Ok(NumberedItem { place: feature.place.clone(), seq, item })
+    let properties = feature.properties.clone();
+    Ok(NumberedItem { place: feature.place.clone(), seq, item, properties })
 }
 
 fn wrong_params(found: &str) -> Problem {

@@ -7,6 +7,7 @@ use crate::fence::items::distinct_ring;
 use crate::fence::{FenceRegion, FenceRole, FenceShape};
 use crate::formats::error::{Located, Place, Problem};
 use crate::formats::item::{FileItem, float, natural};
+use crate::formats::kept::Properties;
 use crate::formats::{MAX_ITEMS, MAX_REGIONS, MAX_VERTICES, Scenario};
 use crate::geodesy::LatLon;
 use crate::mission::{Command, Frame, Home, MissionItem};
@@ -18,7 +19,7 @@ struct Reader<'a> {
     scenario: Scenario,
     items: Vec<NumberedItem>,
     points: Vec<RoutePoint>,
-    lines: Vec<(Place, Vec<LatLon>, f32)>,
+    lines: Vec<(Place, Vec<LatLon>, f32, Properties)>,
     vertices: usize,
     /// Points and lines that say nothing of what they are, where that is no route.
     unused: usize,
@@ -104,10 +105,14 @@ impl Reader<'_> {
                         expected: "a polygon, or a point with a radius in metres",
                     });
                 }
-                Shape::Line(_) if role == Role::Track => {}
+                Shape::Line(_) if role == Role::Track => {
+                    self.scenario.kept.route.clone_from(&feature.properties);
+                }
                 Shape::Line(_) if want == Want::Fences => self.unused += 1,
                 Shape::Line(line) => {
-                    self.lines.push((feature.place.clone(), line.clone(), altitude(&feature)?));
+                    let here = feature.place.clone();
+                    let properties = feature.properties.clone();
+                    self.lines.push((here, line.clone(), altitude(&feature)?, properties));
                 }
                 Shape::Point(point) => {
                     self.add_point(&feature, role, *point, want, pins_are_route)?
@@ -133,6 +138,7 @@ impl Reader<'_> {
                 if self.scenario.mission.home.replace(home).is_some() {
                     return Err(twice("home"));
                 }
+                self.scenario.kept.home.clone_from(&feature.properties);
             }
             Role::Return => {
                 let altitude = number(feature, "altitude")?.unwrap_or(0.0);
@@ -140,6 +146,7 @@ impl Reader<'_> {
                 if self.scenario.fences.return_point.replace((position, altitude)).is_some() {
                     return Err(twice("return point"));
                 }
+                self.scenario.kept.return_point.clone_from(&feature.properties);
             }
             Role::Rally => {
                 let seq = self.scenario.rally.len();
@@ -157,7 +164,9 @@ impl Reader<'_> {
                     params,
                     autocontinue: true,
                 };
-                self.scenario.rally.push(item.to_item(seq as u16)?); // below MAX_ITEMS
+                let item = item.to_item(seq as u16)?; // below MAX_ITEMS
+                self.scenario.rally.push(item);
+                self.scenario.kept.rally.push((item, feature.properties.clone()));
             }
             Role::None if want == Want::Fences || !pins_are_route => self.unused += 1,
             _ if want == Want::Fences => {}
@@ -169,7 +178,8 @@ impl Reader<'_> {
                 let seq = seq.map(|seq| natural(seq, u16::MAX, "seq")).transpose()?;
                 let place = feature.place.clone();
                 let altitude = altitude(feature)?;
-                self.points.push(RoutePoint { place, position, role, seq, altitude });
+                let properties = feature.properties.clone();
+                self.points.push(RoutePoint { place, position, role, seq, altitude, properties });
             }
         }
         Ok(())
@@ -212,6 +222,7 @@ impl Reader<'_> {
             return Err(Problem::TooMany { what: "fence vertices", limit: MAX_VERTICES });
         }
         let origin = format!("{} {}", self.name, feature.place);
+        self.scenario.kept.regions.insert(origin.clone(), feature.properties.clone());
         self.scenario.fences.regions.push(FenceRegion { role: fence_role(role), shape, origin });
         Ok(())
     }
@@ -226,17 +237,21 @@ impl Reader<'_> {
                 let advice = "give it command, frame and params, or remove it";
                 return Err(Problem::Conflict { what, advice }.at(place.clone()));
             }
-            return ordered_items(std::mem::take(&mut self.items));
+            let items = ordered_items(std::mem::take(&mut self.items))?;
+            self.scenario.kept.items.clone_from(&items);
+            return Ok(items.into_iter().map(|(item, _)| item).collect());
         }
         let route = self.route()?;
-        if let [(place, _, _)] = &route[..] {
+        if let [RoutePoint { place, .. }] = &route[..] {
             self.scenario.warnings.push(format!("{place}: a single point is no route; left out"));
             return Ok(Vec::new());
         }
-        if let (None, Some((_, start, _))) = (self.scenario.mission.home, route.first()) {
-            self.scenario.mission.home = Some(Home { position: *start, altitude_amsl: 0.0 });
+        if let (None, Some(start)) = (self.scenario.mission.home, route.first()) {
+            let position = start.position;
+            self.scenario.mission.home = Some(Home { position, altitude_amsl: 0.0 });
         }
-        let item = |(index, (place, position, altitude)): (usize, &(Place, LatLon, f32))| {
+        let item = |(index, point): (usize, &RoutePoint)| {
+            let RoutePoint { place, position, altitude, .. } = point;
             let command = if index == 0 { Command::NAV_TAKEOFF } else { Command::NAV_WAYPOINT };
             let item = FileItem {
                 command: command.0,
@@ -254,14 +269,19 @@ impl Reader<'_> {
             };
             item.to_item(index as u16).map_err(|problem| problem.at(place.clone()))
         };
-        route.iter().enumerate().map(item).collect()
+        let items: Vec<_> = route.iter().enumerate().map(item).collect::<Result<_, Located>>()?;
+        let properties = route.into_iter().map(|point| point.properties);
+        self.scenario.kept.items = items.iter().copied().zip(properties).collect();
+        Ok(items)
     }
 
     /// The route's points in order: from one line, or from points.
-    fn route(&mut self) -> Result<Vec<(Place, LatLon, f32)>, Located> {
+    fn route(&mut self) -> Result<Vec<RoutePoint>, Located> {
         let mut lines = std::mem::take(&mut self.lines).into_iter();
         let points = std::mem::take(&mut self.points);
-        let Some((place, line, altitude)) = lines.next() else { return ordered_points(points) };
+        let Some((place, line, altitude, properties)) = lines.next() else {
+            return ordered_points(points);
+        };
         let second = lines.next().map(|line| line.0);
         if let Some(second) = second.or(points.first().map(|point| point.place.clone())) {
             let what = format!("a second route; the first is the line of {place}");
@@ -271,7 +291,16 @@ impl Reader<'_> {
         if line.len() > MAX_ITEMS {
             return Err(Problem::TooMany { what: "route points", limit: MAX_ITEMS }.at(place));
         }
-        Ok(line.into_iter().map(|position| (place.clone(), position, altitude)).collect())
+        self.scenario.kept.route = properties;
+        let point = |position| RoutePoint {
+            place: place.clone(),
+            position,
+            role: Role::None,
+            seq: None,
+            altitude,
+            properties: Properties::new(),
+        };
+        Ok(line.into_iter().map(point).collect())
     }
 }
 

@@ -1,11 +1,13 @@
 //! Reading KML, in one pass over its XML without recursion.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use quick_xml::Reader;
 use quick_xml::events::{BytesRef, BytesStart, Event};
 use serde_json::{Map, Value};
 
+use super::write::name_of;
 use crate::formats::Scenario;
 use crate::formats::error::{Located, Place, Problem};
 use crate::formats::feature::{Feature, Shape, Want, positions, scenario};
@@ -64,6 +66,11 @@ fn line_at(text: &str, position: u64) -> usize {
 
 fn lossy(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// An attribute's value; as it stands where a reference in it is broken.
+fn unescaped(value: &str) -> String {
+    quick_xml::escape::unescape(value).map_or_else(|_| value.to_owned(), Cow::into_owned)
 }
 
 /// The character of `&amp;`, `&#65;` and their like; nothing for an entity that XML does not define.
@@ -136,7 +143,7 @@ impl State {
         }
         if let (Some(placemark), "Data" | "SimpleData") = (&mut self.placemark, name.as_str()) {
             let attribute = start.try_get_attribute("name").ok().flatten();
-            let attribute = attribute.map(|attribute| lossy(&attribute.value));
+            let attribute = attribute.map(|attribute| unescaped(&lossy(&attribute.value)));
             placemark.data_name = attribute;
         }
         self.path.push(name);
@@ -162,7 +169,12 @@ impl State {
 
 impl Placemark {
     fn feature(&self) -> Feature {
-        let properties = self.properties.clone();
+        let mut properties = self.properties.clone();
+        // A name that quavd's own writer made of the other properties says nothing.
+        let ours = name_of(&properties);
+        if let Some(name) = self.name.as_ref().filter(|name| Some(*name) != ours.as_ref()) {
+            properties.entry("name").or_insert_with(|| Value::String(name.clone()));
+        }
         Feature::named("placemark", self.number, properties, self.name.as_deref())
     }
 

@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use crate::formats::Scenario;
 use crate::formats::error::WriteError;
 use crate::formats::feature::{Feature, Shape, features};
+use crate::formats::kept::Properties;
 use crate::geodesy::LatLon;
 
 /// Corners of the polygon that draws a circle.
@@ -42,8 +43,7 @@ fn placemark(text: &mut String, mut feature: Feature) {
         feature.shapes =
             vec![Shape::Polygon { outer: outline(*centre, radius), holes: Vec::new() }];
     }
-    let name = ["role", "fence", "seq"].iter().find_map(|key| feature.properties.get(*key));
-    let name = name.map(plain).unwrap_or_default();
+    let name = name_of(&feature.properties).unwrap_or_default();
     // Writing into a String cannot fail.
     let _ = writeln!(text, "<Placemark><name>{}</name>", escape(&name));
     let _ = write!(text, " <ExtendedData>");
@@ -73,9 +73,23 @@ fn placemark(text: &mut String, mut feature: Feature) {
     text.push_str("</Placemark>\n");
 }
 
-/// A property as extended data holds it.
+/// What a placemark is called by its properties.
+pub(super) fn name_of(properties: &Properties) -> Option<String> {
+    let name = ["name", "role", "fence", "seq"].iter().find_map(|key| properties.get(*key))?;
+    Some(name.as_str().map_or_else(|| name.to_string(), str::to_owned))
+}
+
+/// A property as extended data holds it: text as it is, unless that would be read as a number or
+/// the like.
 fn plain(value: &Value) -> String {
-    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
+    match value.as_str() {
+        Some(text) if is_plain(text) => text.to_owned(),
+        _ => value.to_string(),
+    }
+}
+
+fn is_plain(text: &str) -> bool {
+    text == text.trim() && serde_json::from_str::<serde::de::IgnoredAny>(text).is_err()
 }
 
 /// Longitude first, rounded to 1e-7 degrees.

@@ -6,6 +6,7 @@ use std::collections::hash_map::Entry;
 use serde::Deserialize;
 
 use super::fence::{GeoFence, read_fence};
+use super::kept::KeptPlan;
 use super::{OBJECT_VERSION, complex};
 use crate::formats::error::{Located, Place, Problem};
 use crate::formats::item::{FileItem, float, jumps_to_indices, natural, place};
@@ -76,7 +77,9 @@ pub(in crate::formats) fn read(name: &str, text: &str) -> Result<Scenario, Locat
     let mut scenario = Scenario::default();
     if let Some(mission) = file.mission {
         scenario.vehicle = vehicle(&mission);
-        scenario.mission = read_mission(mission, &mut scenario.warnings)?;
+        let (mission, counts) = read_mission(mission)?;
+        scenario.kept.plan = KeptPlan::new(text, &counts, &mission.items);
+        scenario.mission = mission;
     }
     if let Some(fence) = file.geo_fence {
         scenario.fences = read_fence(name, fence, &mut scenario.warnings)?;
@@ -115,22 +118,26 @@ pub(super) fn check_version(version: Number, what: &str) -> Result<(), Located> 
     }
 }
 
-fn read_mission(mission: PlanMission, warnings: &mut Vec<String>) -> Result<Mission, Located> {
+/// The mission, and how many of its items each entry of the file's list stands for.
+fn read_mission(mission: PlanMission) -> Result<(Mission, Vec<usize>), Located> {
     check_version(mission.version, "the mission")?;
     let home = match mission.planned_home_position.as_deref() {
         None => None,
         Some(position) => home(position).map_err(|problem| problem.at(Place::Home))?,
     };
     let mut flat = Flat::default();
+    let mut counts = Vec::with_capacity(mission.items.len());
     for (index, item) in mission.items.into_iter().enumerate() {
-        flat.add(index + 1, item, warnings)?;
+        let before = flat.items.len();
+        flat.add(index + 1, item)?;
+        counts.push(flat.items.len() - before);
     }
     let Flat { mut items, numbers, ids } = flat;
     let index_of = |target: f64| ids.get(&target.to_bits()).copied().flatten();
     jumps_to_indices(&mut items, index_of).map_err(|(index, problem)| {
         problem.at(numbers.get(index).map_or(Place::File, |number| Place::MissionItem(*number)))
     })?;
-    Ok(Mission { home, items })
+    Ok((Mission { home, items }, counts))
 }
 
 /// Home; zeros, as a plan without a home has them, are no home.
@@ -171,12 +178,7 @@ struct Flat {
 }
 
 impl Flat {
-    fn add(
-        &mut self,
-        number: usize,
-        item: PlanItem,
-        warnings: &mut Vec<String>,
-    ) -> Result<(), Located> {
+    fn add(&mut self, number: usize, item: PlanItem) -> Result<(), Located> {
         let at = |problem: Problem| problem.at(Place::MissionItem(number));
         match item.kind.as_deref() {
             // Items of the very first versions have no type or a lower-case one.
@@ -184,7 +186,7 @@ impl Flat {
                 let simple = simple(&item).map_err(at)?;
                 self.push(number, item.do_jump_id, &simple)
             }
-            Some("ComplexItem") => self.add_complex(number, item, warnings),
+            Some("ComplexItem") => self.add_complex(number, item),
             Some(other) => Err(at(Problem::NotSupported {
                 what: format!("this item is of type {other:?}, which quavd does not know"),
                 advice: "replace it by waypoints in QGroundControl",
@@ -192,15 +194,9 @@ impl Flat {
         }
     }
 
-    fn add_complex(
-        &mut self,
-        number: usize,
-        item: PlanItem,
-        warnings: &mut Vec<String>,
-    ) -> Result<(), Located> {
+    fn add_complex(&mut self, number: usize, item: PlanItem) -> Result<(), Located> {
         let at = |problem: Problem| problem.at(Place::MissionItem(number));
         let kind = item.complex_item_type.as_deref().unwrap_or("");
-        let before = self.items.len();
         if let Some(items) = item.transect.and_then(|transect| transect.items) {
             for inner in items {
                 let simple = simple(&inner).map_err(at)?;
@@ -217,11 +213,6 @@ impl Flat {
                          by waypoints in QGroundControl",
             }));
         }
-        warnings.push(format!(
-            "mission item {number}: the {kind} item is read as the {} items it stands for; a plan \
-             written back holds those",
-            self.items.len() - before
-        ));
         Ok(())
     }
 

@@ -2,23 +2,26 @@
 
 use serde_json::{Map, Value, json};
 
+use super::kept::{Written, renumbered, with_object};
 use crate::fence::items::{FenceItemProblem, radius};
 use crate::fence::{FenceRole, FenceShape};
 use crate::formats::Scenario;
 use crate::formats::error::{Place, WriteError};
 use crate::formats::item::{FileItem, decimal, json_number, jumps_from_indices};
+use crate::formats::kept::{Properties, with_kept};
 use crate::geodesy::LatLon;
 use crate::mission::Autopilot;
 use crate::mission::{Command, Frame, MissionItem};
 
 /// The scenario as a `.plan`: mission with planned home, geoFence, rally points. Polygons stand
-/// before circles, as the format has a list for each.
+/// before circles, as the format has a list for each. A complex item that was read from a plan is
+/// written as it was where its items are untouched; [`plan_flattened`] names the others.
 ///
 /// # Errors
 /// [`WriteError`] where the format cannot hold something: a jump to nowhere, a region that is no
 /// fence, a rally point whose altitude is not above home.
 pub fn write_plan(scenario: &Scenario) -> Result<String, WriteError> {
-    let plan = json!({
+    let mut plan = json!({
         "fileType": "Plan",
         "groundStation": "quavd",
         "version": 1,
@@ -26,15 +29,36 @@ pub fn write_plan(scenario: &Scenario) -> Result<String, WriteError> {
         "geoFence": fence(scenario)?,
         "rallyPoints": rally(&scenario.rally)?,
     });
+    if let (Value::Object(plan), Some(kept)) = (&mut plan, &scenario.kept.plan) {
+        with_kept(plan, kept.keys().0);
+    }
     Ok(format!("{plan:#}\n"))
+}
+
+/// The complex items of the plan that the mission was read from and that a `.plan` written now
+/// holds as simple items, because waypoints were inserted in them: a sentence each.
+#[must_use]
+pub fn plan_flattened(scenario: &Scenario) -> Vec<String> {
+    let kept = scenario.kept.plan.iter();
+    let lost = kept.flat_map(|kept| kept.flattened(&scenario.mission.items));
+    lost.map(|(number, kind)| {
+        format!(
+            "mission item {number}: the {kind} item has new waypoints inside it, so it is written \
+             as the simple items that it stood for; QGroundControl cannot edit it as a {kind} any \
+             more"
+        )
+    })
+    .collect()
 }
 
 fn mission(scenario: &Scenario) -> Result<Value, WriteError> {
     let vehicle = &scenario.vehicle;
+    let kept = scenario.kept.plan.as_ref();
+    let own = kept.and_then(|kept| kept.keys().1.get("firmwareType"));
     let firmware = match vehicle.autopilot {
-        Autopilot::Unknown => 0,
-        Autopilot::ArduPilot => 3,
-        Autopilot::Px4 => 12,
+        Autopilot::Unknown => own.cloned().unwrap_or(json!(0)),
+        Autopilot::ArduPilot => json!(3),
+        Autopilot::Px4 => json!(12),
     };
     let home = match scenario.mission.home {
         Some(home) => {
@@ -43,7 +67,21 @@ fn mission(scenario: &Scenario) -> Result<Value, WriteError> {
         None => json!([null, null, null]),
     };
     let items = jumps_from_indices(&scenario.mission, 1)?;
-    Ok(json!({
+    let simple = |(index, item)| self::item(index, item, None);
+    let list: Vec<Value> = match kept {
+        None => items.iter().enumerate().map(simple).collect(),
+        Some(kept) => {
+            let entries = kept.entries(&scenario.mission.items).into_iter();
+            let entry = |entry| match entry {
+                Written::Complex(first, _, object) => Some(renumbered(object, first)),
+                Written::Simple(index, object) => {
+                    items.get(index).map(|item| self::item(index, item, object))
+                }
+            };
+            entries.filter_map(entry).collect()
+        }
+    };
+    let mut mission = json!({
         "version": 2,
         "firmwareType": firmware,
         "vehicleType": vehicle.vehicle_type,
@@ -51,11 +89,15 @@ fn mission(scenario: &Scenario) -> Result<Value, WriteError> {
         "hoverSpeed": json_number(vehicle.hover_speed),
         "globalPlanAltitudeMode": 0, // mixed: each item says its own
         "plannedHomePosition": home,
-        "items": items.iter().enumerate().map(|(index, i)| item(index, i)).collect::<Vec<_>>(),
-    }))
+        "items": list,
+    });
+    if let (Value::Object(mission), Some(kept)) = (&mut mission, kept) {
+        with_kept(mission, kept.keys().1);
+    }
+    Ok(mission)
 }
 
-fn item(index: usize, item: &MissionItem) -> Value {
+fn item(index: usize, item: &MissionItem, kept: Option<&Properties>) -> Value {
     let FileItem { command, frame, params, autocontinue } = FileItem::from_item(item);
     let mut object = Map::new();
     object.insert("type".to_owned(), json!("SimpleItem"));
@@ -68,6 +110,9 @@ fn item(index: usize, item: &MissionItem) -> Value {
         object.insert("AltitudeMode".to_owned(), json!(mode));
         object.insert("Altitude".to_owned(), json_number(params[6]));
         object.insert("AMSLAltAboveTerrain".to_owned(), Value::Null);
+    }
+    if let Some(kept) = kept {
+        with_object(&mut object, kept);
     }
     Value::Object(object)
 }

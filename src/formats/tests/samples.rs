@@ -105,6 +105,7 @@ pub(super) fn scenario() -> impl Strategy<Value = Scenario> {
         fences,
         rally,
         vehicle: VehicleHint { autopilot: Autopilot::ArduPilot, ..VehicleHint::default() },
+        kept: crate::formats::Kept::default(),
         warnings: Vec::new(),
     })
 }

@@ -15,11 +15,22 @@ pub(super) struct Circuit {
 
 impl Circuit {
     pub(super) fn new(mixers: &Mixers) -> Self {
-        let gammas = mixers.gammas.clone();
-        let layers = gammas.len();
+        Self { gammas: mixers.gammas.clone(), walk: Self::walks(&mixers.betas, None) }
+    }
+
+    /// The amplitudes of [`Self::walk`], or their derivative with respect to β of one layer.
+    pub(super) fn walks(betas: &[f64], derived: Option<usize>) -> [Vec<Complex64>; 2] {
+        let layers = betas.len();
         // Amplitude of a layer's mixer to leave the bit as it is, and to flip it (times −i).
-        let steps: Vec<(f64, f64)> = mixers.betas.iter().map(|beta| beta.sin_cos()).collect();
-        let walk = [0, 1].map(|bit| {
+        let steps: Vec<(f64, f64)> = betas
+            .iter()
+            .enumerate()
+            .map(|(layer, beta)| match beta.sin_cos() {
+                (sin, cos) if derived == Some(layer) => (cos, -sin),
+                step => step,
+            })
+            .collect();
+        [0, 1].map(|bit| {
             let amplitude = |a: usize| {
                 let next =
                     |layer: usize| if layer + 1 < layers { a >> (layer + 1) & 1 } else { bit };
@@ -31,8 +42,7 @@ impl Circuit {
                 })
             };
             (0..1 << layers).map(amplitude).collect()
-        });
-        Self { gammas, walk }
+        })
     }
 
     /// Number of trajectories of one qubit.
@@ -47,7 +57,7 @@ impl Circuit {
     }
 
     /// `e^{−i h Σ_l γ_l a_l}` over all trajectories.
-    fn phases(&self, h: f64) -> Vec<Complex64> {
+    pub(super) fn phases(&self, h: f64) -> Vec<Complex64> {
         let mut phases = vec![Complex64::ONE];
         for gamma in &self.gammas {
             let plus = Complex64::cis(-h * gamma);

@@ -6,7 +6,8 @@
 //! `sweep` steps from site to site, and `gradient` makes ⟨H⟩ and all derivatives out of a sweep from
 //! each end. For bitstrings the ket's 2^p amplitudes are enough: `circuit` has them for one qubit,
 //! `norms` what lies to the right, `prefixes` carries them
-//! from qubit to qubit, and `sampling` draws from all that.
+//! from qubit to qubit, and `sampling` draws from all that; `score` says how a bitstring's probability
+//! changes with the angles.
 
 mod circuit;
 mod folded;
@@ -14,6 +15,7 @@ mod gradient;
 mod norms;
 mod prefixes;
 mod sampling;
+mod score;
 mod site;
 mod sweep;
 
@@ -21,13 +23,15 @@ use rand_chacha::ChaCha8Rng;
 
 use super::angles::Angles;
 use super::bits::Bits;
+use super::cvar;
 use super::engine::{Engine, EngineError, EngineKind, Sample};
-use super::ising::ChainIsing;
+use super::ising::{ChainIsing, Ising};
 use super::simd;
 use circuit::Circuit;
 use gradient::{Expectation, Gradient, WINDOW};
 use norms::Norms;
 use sampling::{Draw, Probability};
+use score::Scores;
 use site::{MIN_LAYERS, Mixers};
 use sweep::{SIDE_SLABS, SPECTRUM_SLABS, Workspace};
 
@@ -80,6 +84,15 @@ impl ChainEngine {
     }
 }
 
+/// The derivatives of the circuit's own layers, which come last.
+fn without_padding(padded: &Angles, layers: usize) -> Angles {
+    let padding = padded.layers() - layers;
+    let mut own = Angles::zeros(layers);
+    own.gammas_mut().copy_from_slice(&padded.gammas()[padding..]);
+    own.betas_mut().copy_from_slice(&padded.betas()[padding..]);
+    own
+}
+
 impl Engine for ChainEngine {
     fn kind(&self) -> EngineKind {
         EngineKind::Chain
@@ -100,11 +113,34 @@ impl Engine for ChainEngine {
         let Self { chain, workspace, .. } = self;
         let (expectation, padded) =
             simd::run(Gradient { chain, mixers, workspace, window: WINDOW });
-        let padding = padded.layers() - angles.layers();
-        let mut gradient = Angles::zeros(angles.layers());
-        gradient.gammas_mut().copy_from_slice(&padded.gammas()[padding..]);
-        gradient.betas_mut().copy_from_slice(&padded.betas()[padding..]);
-        Ok((expectation, gradient))
+        Ok((expectation, without_padding(&padded, angles.layers())))
+    }
+
+    fn cvar_and_gradient(
+        &mut self,
+        angles: &Angles,
+        alpha: f64,
+        shots: u32,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<(f64, Angles), EngineError> {
+        let samples = self.sample(angles, shots, rng)?;
+        let mixers = self.mixers(angles)?;
+        let circuit = Circuit::new(&mixers);
+        let scores = Scores::new(&self.chain, &circuit, &mixers.betas);
+        let ising = Ising::from(self.chain.clone());
+        let (layers, padded) = (angles.layers(), mixers.betas.len());
+        let (value, gradient) = cvar::estimate(
+            &samples,
+            alpha,
+            padded,
+            |bits| ising.energy(bits),
+            |bits| scores.score(bits),
+        );
+        Ok((value, without_padding(&gradient, layers)))
+    }
+
+    fn cvar_is_exact(&self) -> bool {
+        false
     }
 
     fn sample(

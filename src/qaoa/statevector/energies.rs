@@ -55,6 +55,16 @@ impl Energies {
         energies
     }
 
+    /// A range that holds all energies.
+    pub(super) fn range(&self) -> (f64, f64) {
+        let fields = self.low_fields.iter().chain(&self.high_fields).map(|h| h.abs());
+        let pairs = [&self.low_couplings, &self.high_couplings, &self.across];
+        let pairs = pairs.into_iter().flatten().map(|(_, _, value)| value.abs());
+        // Rounding adds up, in single precision more than in double.
+        let reach = fields.chain(pairs).sum::<f64>() * (1.0 + 1e-4) + f64::MIN_POSITIVE;
+        (self.constant - reach, self.constant + reach)
+    }
+
     /// Energy of the low qubits alone.
     pub(super) fn low_energy(&self, index: usize) -> f64 {
         energy(index, &self.low_fields, &self.low_couplings)

@@ -4,12 +4,17 @@
 use rayon::prelude::*;
 
 use super::super::angles::Angles;
+use super::super::cvar::Tail;
 use super::super::ising::Ising;
 use super::super::simd;
 use super::energies::Energies;
 use super::kernels::{Energy, First, Mix, Mixer, Phase, Phases, Plain, Turn, Unmix, Unphase};
 use super::layout::{Amplitudes, Layout};
 use super::vector::Vector;
+
+/// Bins into which [`Evolution::quantile`] divides the energies, and how often it does.
+const BINS: usize = 256;
+const DIVISIONS: usize = 6;
 
 /// The state of one problem.
 #[derive(Debug, Clone)]
@@ -80,8 +85,55 @@ impl<V: Vector> Evolution<V> {
         in_order(sums)
     }
 
-    /// ⟨H⟩ and its derivatives. Leaves no state behind.
-    pub(super) fn gradient(&mut self, angles: &Angles) -> (f64, Angles) {
+    /// The energy below which a share `alpha` of all measurements lies after [`Self::run`].
+    pub(super) fn quantile(&self, alpha: f64) -> f64 {
+        let (mut low, mut high) = self.energies.range();
+        let wanted = alpha * self.histogram(low, high).iter().sum::<f64>();
+        let mut below = 0.0;
+        for _ in 0..DIVISIONS {
+            let bins = self.histogram(low, high);
+            let width = (high - low) / BINS as f64;
+            let mut bin = 0;
+            // Rounding must not lead past the last bin.
+            while bin + 1 < BINS && below + bins[bin] < wanted {
+                below += bins[bin];
+                bin += 1;
+            }
+            (low, high) = (low + bin as f64 * width, low + (bin + 1) as f64 * width);
+        }
+        high
+    }
+
+    /// The probability in each of [`BINS`] equal parts of a range of energies.
+    fn histogram(&self, low: f64, high: f64) -> Vec<f64> {
+        let Self { layout, energies, low_vectors, state, .. } = self;
+        let scale = BINS as f64 / (high - low).max(f64::MIN_POSITIVE);
+        let rows = state.re.par_chunks(layout.row).zip(state.im.par_chunks(layout.row));
+        let parts: Vec<Vec<f64>> = rows
+            .enumerate()
+            .map(|(row, (re, im))| {
+                let mut here = vec![V::ZERO; layout.row];
+                energies.fill(row, low_vectors, &mut here);
+                let mut bins = vec![0.0; BINS];
+                for ((x, y), e) in re.iter().zip(im).zip(&here) {
+                    for lane in 0..V::LANES {
+                        let bin = (e.lane(lane) - low) * scale;
+                        if (0.0..BINS as f64).contains(&bin) {
+                            bins[bin as usize] += x.lane(lane).powi(2) + y.lane(lane).powi(2);
+                        }
+                    }
+                }
+                bins
+            })
+            .collect();
+        parts.iter().fold(vec![0.0; BINS], |mut sum, part| {
+            sum.iter_mut().zip(part).for_each(|(sum, part)| *sum += part);
+            sum
+        })
+    }
+
+    /// ⟨H⟩ and its derivatives, or those of a tail's CVaR. Leaves no state behind.
+    pub(super) fn gradient(&mut self, angles: &Angles, tail: Option<Tail>) -> (f64, Angles) {
         self.forward(angles);
         let Self { layout, energies, low_energies, low_vectors, state, adjoint } = self;
         let (layout, energies) = (&*layout, &*energies);
@@ -90,7 +142,7 @@ impl<V: Vector> Evolution<V> {
 
         let rows = state.rows(layout).zip(adjoint.rows(layout)).enumerate();
         let expectation = in_order(rows.map(|(row, (state, adjoint))| {
-            simd::run(Turn { energies, low_energies: low_vectors, row, state, adjoint })
+            simd::run(Turn { energies, low_energies: low_vectors, tail, row, state, adjoint })
         }));
         for layer in (0..angles.layers()).rev() {
             let mixer = &Mixer::new(layout.qubits(), -angles.betas()[layer]);

@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use super::super::cvar::Tail;
 use super::super::simd::Kernel;
 use super::energies::{Energies, Row};
 use super::layout::{Columns, Layout, Part};
@@ -306,10 +307,12 @@ impl<V: Vector> Kernel for Energy<'_, V> {
     }
 }
 
-/// Turns round: λ = Hψ of a row, both transformed for the mixer. Returns ⟨ψ|H|ψ⟩.
+/// Turns round: λ = Hψ of a row, both transformed for the mixer. Returns ⟨ψ|H|ψ⟩. With a tail, what
+/// it makes of H takes its place.
 pub(super) struct Turn<'a, V> {
     pub(super) energies: &'a Energies,
     pub(super) low_energies: &'a [V],
+    pub(super) tail: Option<Tail>,
     pub(super) row: usize,
     pub(super) state: Part<'a, V>,
     pub(super) adjoint: Part<'a, V>,
@@ -320,9 +323,14 @@ impl<V: Vector> Kernel for Turn<'_, V> {
 
     #[inline(always)]
     fn run(self) -> f64 {
-        let Self { energies, low_energies, row, mut state, mut adjoint } = self;
+        let Self { energies, low_energies, tail, row, mut state, mut adjoint } = self;
         backward(&mut state);
         energies.fill(row, low_energies, adjoint.im);
+        if let Some(tail) = tail {
+            for energy in adjoint.im.iter_mut() {
+                *energy = V::from_fn(|lane| tail.value(energy.lane(lane)));
+            }
+        }
         let mut sum = V::ZERO;
         let there = adjoint.re.iter_mut().zip(adjoint.im.iter_mut());
         for ((x, y), (u, v)) in state.re.iter().zip(state.im.iter()).zip(there) {

@@ -20,6 +20,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::angles::Angles;
 use super::bits::Bits;
+use super::cvar::Tail;
 use super::engine::{Engine, EngineError, EngineKind, Sample};
 use super::ising::Ising;
 use evolution::Evolution;
@@ -138,9 +139,33 @@ impl Engine for StatevectorEngine {
     fn expectation_and_gradient(&mut self, angles: &Angles) -> Result<(f64, Angles), EngineError> {
         self.held = None;
         Ok(match &mut self.state {
-            State::Double(evolution) => evolution.gradient(angles),
-            State::Single(evolution) => evolution.gradient(angles),
+            State::Double(evolution) => evolution.gradient(angles, None),
+            State::Single(evolution) => evolution.gradient(angles, None),
         })
+    }
+
+    fn cvar_and_gradient(
+        &mut self,
+        angles: &Angles,
+        alpha: f64,
+        _shots: u32,
+        _rng: &mut ChaCha8Rng,
+    ) -> Result<(f64, Angles), EngineError> {
+        self.hold(angles);
+        let quantile = match &self.state {
+            State::Double(evolution) => evolution.quantile(alpha),
+            State::Single(evolution) => evolution.quantile(alpha),
+        };
+        self.held = None;
+        let tail = Some(Tail { alpha, quantile });
+        Ok(match &mut self.state {
+            State::Double(evolution) => evolution.gradient(angles, tail),
+            State::Single(evolution) => evolution.gradient(angles, tail),
+        })
+    }
+
+    fn cvar_is_exact(&self) -> bool {
+        true
     }
 
     fn sample(

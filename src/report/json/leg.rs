@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::mission::legs::number as item_number;
 use crate::planner::candidates::{Candidate, Source};
-use crate::planner::rounds::{Challenger, QpuRound, Round};
+use crate::planner::rounds::{Challenger, QpuRound, Round, Window};
 use crate::replan::LegVerdict;
 use crate::report::stretch::Stretch;
 
@@ -38,11 +38,18 @@ pub struct RoundDocument {
     pub challenger: Challenger,
     /// The engine that ran.
     pub engine: String,
-    /// Qubits of the chain.
+    /// Qubits of the circuit.
     pub qubits: usize,
+    /// The part of a longer chain that they are, where the engine does not take all of it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub window: Option<Window>,
     /// Layers of the circuit.
     pub layers: usize,
-    /// ⟨H⟩ at the start of the training and after each step.
+    /// What the training lowered: `mean` (⟨H⟩) or `cvar α`.
+    pub objective: String,
+    /// Whether that was estimated from samples at every step.
+    pub loss_is_sampled: bool,
+    /// The objective at the start of the training and after each step.
     pub loss: Vec<f64>,
     /// Energy of the cheapest sample.
     pub best_sample: f64,
@@ -106,7 +113,10 @@ impl From<&Round> for RoundDocument {
             challenger: round.challenger,
             engine: round.engine.to_string(),
             qubits: round.qubits,
+            window: round.window,
             layers: round.layers,
+            objective: round.objective.to_string(),
+            loss_is_sampled: round.loss_is_sampled,
             loss: round.loss.clone(),
             best_sample: round.best_sample,
             exact_optimum: round.exact_optimum,

@@ -17,11 +17,12 @@ const BUFFER: &str = "#fbe3bd";
 const OBSTACLE: &str = "#8b95a1";
 const OUTSIDE: &str = "#d9dde2";
 
-/// The height of an entry.
+/// The height of an entry, and the width of a column of them.
 const ROW: f64 = 21.5;
+const COLUMN: f64 = 300.0;
 
 pub(super) fn legend(scene: &Scene<'_>, view: &View, run: &Run<'_>, rect: Rect) -> Group {
-    let mut list = List { group: Group::new(), x: rect.x, y: rect.y + 16.0 };
+    let mut list = List { group: Group::new(), x: rect.x, y: rect.y + 16.0, rect };
     list.title("Legend");
     let line = |class: &str| Path::new().set("d", "M0 0h34").set("class", class);
     match scene.is_planned {
@@ -82,11 +83,12 @@ fn box_(fill: &str, width: f64, height: f64) -> svg::node::element::Rectangle {
     rect.element().set("fill", fill)
 }
 
-/// Entries below each other.
+/// Entries below each other, in columns where the rectangle has no more room below.
 struct List {
     group: Group,
     x: f64,
     y: f64,
+    rect: Rect,
 }
 
 impl List {
@@ -97,6 +99,9 @@ impl List {
     }
 
     fn entry(&mut self, swatch: impl Into<Box<dyn svg::Node>>, name: &str) {
+        if self.y > self.rect.bottom() {
+            (self.x, self.y) = (self.x + COLUMN, self.rect.y + 16.0 + ROW);
+        }
         let placed = Group::new()
             .set("transform", format!("translate({} {})", px(self.x), px(self.y - 4.5)))
             .add(swatch);

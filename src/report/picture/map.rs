@@ -43,26 +43,38 @@ pub(super) fn visible<'a>(
     view: &'a View,
     grown: f64,
 ) -> impl Iterator<Item = &'a Outline> {
-    scene.outlines.iter().filter(move |outline| match outline {
+    scene.outlines.iter().filter(move |outline| is_visible(outline, view, grown))
+}
+
+fn is_visible(outline: &Outline, view: &View, grown: f64) -> bool {
+    match outline {
         Outline::Solid(rings) => view.shows(rings.iter().flatten(), grown),
         Outline::SolidDisc { centre, radius } => view.shows([centre], radius + grown),
         Outline::Zone(_) | Outline::ZoneDisc { .. } => false,
-    })
+    }
 }
 
-fn obstacles(scene: &Scene<'_>, view: &View, around: f64) -> String {
-    let data = visible(scene, view, around).map(|outline| match outline {
+/// Path data of an obstacle that can be seen with so many metres around it.
+pub(super) fn outline_path(outline: &Outline, around: f64, view: &View) -> Option<String> {
+    is_visible(outline, view, around).then(|| outline_data(outline, view))
+}
+
+fn outline_data(outline: &Outline, view: &View) -> String {
+    match outline {
         Outline::Solid(rings) => rings.iter().map(|ring| view.ring(ring)).collect(),
         Outline::SolidDisc { centre, radius } => view.circle(*centre, *radius),
         Outline::Zone(_) | Outline::ZoneDisc { .. } => String::new(),
-    });
-    data.collect()
+    }
+}
+
+fn obstacles(scene: &Scene<'_>, view: &View, around: f64) -> String {
+    visible(scene, view, around).map(|outline| outline_data(outline, view)).collect()
 }
 
 /// The buffers. What lies within `margin` of a ring is what a round pen of twice that width covers:
 /// exact, rounded corners included, and joined where buffers meet. The half of it that is inside an
 /// obstacle or outside an inclusion is painted over later.
-fn buffers(scene: &Scene<'_>, view: &View) -> Group {
+pub(super) fn buffers(scene: &Scene<'_>, view: &View) -> Group {
     let data = obstacles(scene, view, scene.margin) + &inclusions(scene, view).concat();
     let pen = 2.0 * scene.margin * view.scale;
     Group::new()
@@ -71,7 +83,7 @@ fn buffers(scene: &Scene<'_>, view: &View) -> Group {
 }
 
 /// Path data of each inclusion, or of their union.
-fn inclusions(scene: &Scene<'_>, view: &View) -> Vec<String> {
+pub(super) fn inclusions(scene: &Scene<'_>, view: &View) -> Vec<String> {
     if let Some(union) = scene.union {
         let rings = union.iter().flat_map(|polygon| {
             std::iter::once(polygon.exterior()).chain(polygon.interiors()).map(|ring| &ring.0)
@@ -90,7 +102,7 @@ fn inclusions(scene: &Scene<'_>, view: &View) -> Vec<String> {
 }
 
 /// What inclusions forbid: the panel without each of them.
-fn outside(scene: &Scene<'_>, view: &View) -> Group {
+pub(super) fn outside(scene: &Scene<'_>, view: &View) -> Group {
     let Rect { x, y, width, height } = view.panel;
     let panel = format!("M{} {}h{}v{}h-{}Z", px(x), px(y), px(width), px(height), px(width));
     let shaded = inclusions(scene, view).into_iter().map(|ring| panel.clone() + &ring);
@@ -120,7 +132,7 @@ pub(super) fn shows_outside(scene: &Scene<'_>, view: &View) -> bool {
     })
 }
 
-fn candidates(scene: &Scene<'_>, view: &View) -> Group {
+pub(super) fn candidates(scene: &Scene<'_>, view: &View) -> Group {
     [(Source::Grid, "grid"), (Source::Corners, "corners")].into_iter().fold(
         Group::new(),
         |group, (source, class)| {
@@ -135,7 +147,7 @@ fn candidates(scene: &Scene<'_>, view: &View) -> Group {
 }
 
 /// The edges as one path; those that follow each other are joined.
-fn lines(edges: &[Edge], view: &View) -> String {
+pub(super) fn lines(edges: &[Edge], view: &View) -> String {
     let mut data = String::new();
     let mut line: Vec<Xy> = Vec::new();
     for edge in edges {

@@ -1,26 +1,37 @@
-//! The picture of a plan: one self-contained SVG on white, for browsers, README files and print.
+//! The picture of a plan: the map alone as one self-contained SVG on white, for browsers, README
+//! files and print.
 //!
 //! - `scene`: what is drawn, in the local metres of one zone;
 //! - `view`: from local metres to the page;
 //! - `map`: obstacles, buffers, fences, candidates, old and new route;
 //! - `places`: the numbered waypoints, start and goal;
-//! - `chart`: axes and curves; `training`: the two charts of the QAOA rounds;
+//! - `chart`: axes and curves; `training`: the two charts of the QAOA rounds for the HTML report;
+//! - `interactive`: the map and the charts of the HTML report;
+//! - `braille`: the map on a terminal;
+//! - `png`: the picture in pixels;
 //! - `findings`: what is not clear, where a mission was only judged;
 //! - `legend`: what the colours mean.
 //!
 //! A mission over several zones is drawn for the zone with the most legs.
 
+mod braille;
 mod chart;
 mod findings;
+mod interactive;
 mod legend;
 mod map;
 mod places;
+mod png;
 mod scene;
 mod training;
 mod view;
 
 use svg::Document;
 use svg::node::element::{Group, Rectangle, Style, Text, Title};
+
+pub(super) use braille::braille;
+pub(super) use interactive::{InteractiveMap, charts, interactive};
+pub(super) use png::png;
 
 use super::run::Run;
 use super::text::{change, clearance, count, plain};
@@ -34,9 +45,9 @@ const PAGE: f64 = 1200.0;
 const BORDER: f64 = 20.0;
 const GAP: f64 = 24.0;
 
-/// The height of the title, and of what is below the map: the charts, or what is not clear.
+/// The height of the title, and of what is below the map: the legend, beside it what is not clear.
 const HEAD: f64 = 66.0;
-const CHARTS: f64 = 250.0;
+const LEGEND: f64 = 92.0;
 const FINDINGS: f64 = 200.0;
 
 /// The least and the most height of the map.
@@ -66,8 +77,6 @@ text{font:13px 'Segoe UI',Roboto,Helvetica,Arial,sans-serif;fill:#2b3440}\
 .number{font-size:12px;font-weight:600;fill:#0b3d91;stroke:#fff;stroke-width:3.5;\
 stroke-linejoin:round;paint-order:stroke;text-anchor:middle}\
 .ink{fill:#2b3440}.plate{fill:#fff;fill-opacity:.88}\
-.axis{stroke:#9aa3ad}.tick{stroke:#e3e6ea}.later{stroke:#6f86a6;stroke-opacity:.6}\
-.later,.first{fill:none}.first{stroke-width:2.6;stroke-linejoin:round}\
 .middle{text-anchor:middle}.end{text-anchor:end}";
 
 /// What a picture is of.
@@ -114,13 +123,13 @@ pub fn picture<'a>(
     let panel = Rect { x: BORDER, y: BORDER + HEAD, width, height };
     let view = View::new(panel, low, high);
 
-    let charts = panel.y + panel.height + GAP;
-    let below = if subject.after.is_some() { CHARTS } else { FINDINGS };
-    let page_height = charts + below + BORDER;
-    let losses = Rect { x: BORDER, y: charts, width: 500.0, height: below };
-    let lengths = Rect { x: losses.right() + GAP, width: 330.0, ..losses };
-    let key =
-        Rect { x: lengths.right() + GAP, width: PAGE - BORDER - GAP - lengths.right(), ..losses };
+    let top = panel.y + panel.height + GAP;
+    let below = if subject.after.is_some() { LEGEND } else { FINDINGS };
+    let page_height = top + below + BORDER;
+    let whole = Rect { x: BORDER, y: top, width, height: below };
+    let left = Rect { width: 854.0, ..whole };
+    let right = Rect { x: left.right() + GAP, width: width - GAP - left.width, ..whole };
+    let key = if subject.after.is_some() { whole } else { right };
     let mut document = Document::new()
         .set("viewBox", (0, 0, PAGE as i32, page_height as i32))
         .set("width", PAGE as i32)
@@ -131,13 +140,9 @@ pub fn picture<'a>(
         .add(header(&subject, run, title))
         .add(map::map(&scene, &view))
         .add(legend::legend(&scene, &view, run, key));
-    document = if subject.after.is_some() {
-        document
-            .add(training::losses(&scene.records, losses))
-            .add(training::lengths(&scene.records, lengths))
-    } else {
-        document.add(findings::findings(subject.before, losses))
-    };
+    if subject.after.is_none() {
+        document = document.add(findings::findings(subject.before, left));
+    }
     Ok(format!("{document}\n"))
 }
 
@@ -230,7 +235,6 @@ mod tests {
         let marked = |class: &str| classes.iter().filter(|c| *c == class).count();
         // One of them is the legend's.
         assert_eq!(marked("inserted"), result.inserted.len() + 1);
-        assert_eq!(marked("first"), 2 * 2 + 2, "two curves for each leg, and their names");
         for index in &result.inserted {
             let number = (index + 1).to_string();
             assert!(texts.contains(&number), "{number}");

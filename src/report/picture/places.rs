@@ -23,26 +23,29 @@ pub(super) fn places(scene: &Scene<'_>, view: &View) -> Group {
         group = group.add(dot(place, view));
     }
     group = group.add(ends(scene, view));
-    if scene.places.len() > NUMBERED {
-        return group;
-    }
-    let mut numbers = Numbers::new(scene, view);
-    for place in &scene.places {
-        if let Some(number) = place.number {
-            let label = number.to_string();
-            let at = numbers.place(view.at(place.at), &label);
-            group = group.add(text(at.x, at.y + 4.0, "number", &label));
-        }
+    for (_, at, label) in numbers(scene, view) {
+        group = group.add(text(at.x, at.y + 4.0, "number", &label));
     }
     group
 }
 
-fn dot(place: &Place, view: &View) -> Circle {
-    let at = view.at(place.at);
-    let (radius, class) = match place.role {
-        Role::Item => (5.5, "item"),
-        Role::Inserted => (4.5, "inserted"),
-    };
+/// The numbers of the places: which place, the middle of the number on the page, the number.
+pub(super) fn numbers(scene: &Scene<'_>, view: &View) -> Vec<(usize, Xy, String)> {
+    if scene.places.len() > NUMBERED {
+        return Vec::new();
+    }
+    let mut numbers = Numbers::new(scene, view);
+    let places = scene.places.iter().enumerate();
+    places
+        .filter_map(|(index, place)| {
+            let label = place.number?.to_string();
+            Some((index, numbers.place(view.at(place.at), &label), label))
+        })
+        .collect()
+}
+
+/// What a place is, in words.
+pub(super) fn describe(place: &Place) -> String {
     let name = match (place.number, place.role) {
         (None, _) => "start, home or rally point".to_owned(),
         (Some(number), Role::Item) => format!("item {number}"),
@@ -51,7 +54,16 @@ fn dot(place: &Place, view: &View) -> Circle {
     let clearance = place.clearance.map_or_else(String::new, |clearance| {
         format!("; the leg to it keeps {:.2} m", (clearance * 100.0).floor() / 100.0)
     });
-    circle(at, radius, class).add(Title::new(name + &clearance))
+    name + &clearance
+}
+
+fn dot(place: &Place, view: &View) -> Circle {
+    let at = view.at(place.at);
+    let (radius, class) = match place.role {
+        Role::Item => (5.5, "item"),
+        Role::Inserted => (4.5, "inserted"),
+    };
+    circle(at, radius, class).add(Title::new(describe(place)))
 }
 
 fn circle(at: Xy, radius: f64, class: &str) -> Circle {

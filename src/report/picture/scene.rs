@@ -11,6 +11,7 @@ use crate::mission::Leg;
 use crate::mission::legs::{LegKind, number as item_number};
 use crate::planner::candidates::Source;
 use crate::replan::{Field, LegRecord, LegVerdict, Verdict};
+use crate::report::text::clearance;
 
 /// The share of the route's extent that is shown around it.
 const AROUND: f64 = 0.06;
@@ -68,6 +69,8 @@ pub(super) struct Scene<'a> {
     /// The legs planned in this zone.
     pub(super) records: Vec<&'a LegRecord>,
     pub(super) places: Vec<Place>,
+    /// What is flown, or was judged, leg by leg in words.
+    pub(super) tips: Vec<(Edge, String)>,
     pub(super) start: Option<Xy>,
     pub(super) goal: Option<Xy>,
 }
@@ -83,6 +86,7 @@ impl<'a> Scene<'a> {
             new: Vec::new(),
             records: Vec::new(),
             places: Vec::new(),
+            tips: Vec::new(),
             start: None,
             goal: None,
         };
@@ -112,6 +116,9 @@ impl<'a> Scene<'a> {
         };
         scene.is_planned = subject.after.is_some();
         scene.places = places(flown, inserted, &frame, is_here)?;
+        for verdict in flown.legs.iter().filter(|v| is_here(&v.leg)) {
+            scene.tips.push((edge(&verdict.leg, &frame)?, told(verdict)));
+        }
         let way = flown.places();
         let end = |place: Option<&crate::geodesy::LatLon>| {
             place.map(|&place| frame.to_local(place)).transpose()
@@ -246,6 +253,14 @@ fn zone_of(leg: &Leg) -> Zone {
 fn edge(leg: &Leg, frame: &LocalFrame) -> Result<Edge, ProjectionError> {
     let (from, to) = (frame.to_local(leg.from.position)?, frame.to_local(leg.to.position)?);
     Ok(Edge { from, to })
+}
+
+fn told(verdict: &LegVerdict) -> String {
+    let LegVerdict { leg, length, blocker, .. } = verdict;
+    let near = blocker.as_ref().map_or_else(String::new, |(region, meets)| {
+        format!(", {} {region}", if *meets { "meets" } else { "too near to" })
+    });
+    format!("{}: {length:.1}, clearance {}{near}", leg.name(), clearance(verdict.clearance))
 }
 
 /// One edge for all between the same places, whatever their direction: dashes of two would fill

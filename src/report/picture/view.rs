@@ -93,6 +93,11 @@ impl View {
         Self { panel, centre: (low + high) / 2.0, scale }
     }
 
+    /// The same view in a panel around the same middle.
+    pub(super) fn within(self, panel: Rect) -> Self {
+        Self { panel, ..self }
+    }
+
     /// A point on the page.
     pub(super) fn at(&self, point: Xy) -> Xy {
         let offset = (point - self.centre) * self.scale;
