@@ -9,7 +9,7 @@ PACKAGES := cmake g++ make pkg-config sqlite3 libsqlite3-dev python3-venv system
 
 TOOLS := target/tools
 
-.PHONY: all build demo ibm-demo faults deb test-deb soak daemon-figures test test-rust test-python test-ibm lint doc \
+.PHONY: all build demo ibm-demo faults deb test-deb soak companions daemon-figures test test-rust test-python test-ibm lint doc \
 	bench bench-table bench-peers bench-link bench-ibm fuzz examples gallery reference clean system
 
 all: build
@@ -72,6 +72,12 @@ test-deb: deb
 SOAK ?= 60
 soak: build $(VENV)/.ready
 	$(VENV)/bin/python sitl/soak.py --quavd $(BIN) --minutes $(SOAK)
+
+# quavd, MAVSDK and MAVProxy side by side on one vehicle. Downloads half a gigabyte at first.
+companions: build
+	$(PYTHON) -m venv target/companions
+	target/companions/bin/pip install --quiet --disable-pip-version-check -r sitl/requirements-companions.txt
+	target/companions/bin/python sitl/companions.py --quavd $(BIN)
 
 # Idle cost, and the time from a change on the vehicle to the verified upload.
 daemon-figures: build $(VENV)/.ready

@@ -52,7 +52,7 @@ pub struct ServiceArgs {
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=5), value_name = "N")]
     pub user_command: u16,
     /// How long the vehicle's plans must have been quiet before planning begins, seconds, 0.1 to 60.
-    #[arg(long, default_value_t = 1.0, value_parser = debounce, value_name = "S")]
+    #[arg(long, default_value_t = 0.5, value_parser = debounce, value_name = "S")]
     pub debounce: f64,
     /// How often the vehicle's plans are compared with those last seen where it gives no hint of a
     /// change itself, seconds, 5 to 3600.

@@ -18,6 +18,11 @@ const EXAMPLES: &[(&str, &str)] = &[
     ("obstacles", "buildings.kml"),
     ("signing_key", "credential:signing-key"),
     ("deadline", "10"),
+    ("backend", "least_busy"),
+    ("api_key_file", "ibm-api-key"),
+    ("crn_file", "ibm-crn"),
+    ("iam_url", "https://iam.cloud.ibm.com"),
+    ("api_url", "https://quantum.cloud.ibm.com/api"),
 ];
 /// The width of comments in the example.
 const WIDTH: usize = 96;
@@ -67,6 +72,7 @@ fn described(arg: &Arg) -> Option<OptionDoc> {
     let takes = match (is_switch, names(arg)) {
         (true, _) => "true|false".to_owned(),
         (false, names) if names.is_empty() => {
+            // clap names the value after the option where nothing else is said.
             let names = arg.get_value_names().unwrap_or_default();
             names.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
         }
