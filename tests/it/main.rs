@@ -24,3 +24,4 @@ mod security;
 mod sitl;
 mod terminal;
 mod transfers;
+mod windows;
