@@ -269,3 +269,84 @@ fn decided(
     (run.objective, run.loss_is_sampled) = objective;
     (pair, run, round)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planner::{QpuSettings, Settings};
+    use crate::qaoa::qpu::testing::IdealQpu;
+    use crate::qaoa::{EngineChoice, EngineKind};
+    use crate::replan::{Options, Replanned};
+    use crate::report::samples::{POND, planned_on};
+
+    fn options(qpu: QpuSettings) -> Options {
+        let engine = EngineChoice::Only(EngineKind::Ibm);
+        let settings =
+            Settings { qubits: 6, layers: 2, shots: 256, engine, qpu, ..Settings::default() };
+        Options { settings, ..Options::default() }
+    }
+
+    fn engines(result: &Replanned) -> Vec<EngineKind> {
+        let rounds = result.legs.iter().flat_map(|leg| &leg.rounds);
+        let mut engines: Vec<EngineKind> = rounds.map(|round| round.engine).collect();
+        engines.dedup();
+        engines
+    }
+
+    #[test]
+    fn a_mission_is_planned_in_few_jobs_and_nothing_runs_elsewhere() {
+        let mut qpu = IdealQpu::new();
+        let options = options(QpuSettings { jobs: 2, circuits: 3, ..QpuSettings::default() });
+        let result = planned_on(POND, &options, Some(&mut qpu)).unwrap();
+        assert_eq!(engines(&result), [EngineKind::Ibm]);
+        assert_eq!(result.fallback(), None);
+        assert!(result.legs.len() == 2 && qpu.used.jobs <= 4 && qpu.used.circuits <= 12);
+        for round in result.legs.iter().flat_map(|leg| &leg.rounds) {
+            let measured = round.qpu.as_ref().unwrap();
+            let off = (measured.expectation - measured.ideal_expectation).abs();
+            assert!(off < 6.0 * measured.standard_error, "{measured:?}");
+        }
+    }
+
+    #[test]
+    fn training_on_the_qpu_happens_once_a_leg_and_its_curve_is_kept() {
+        let mut qpu = IdealQpu::new();
+        let training = QpuTraining::Qpu;
+        let options =
+            options(QpuSettings { training, steps: 5, jobs: 1, ..QpuSettings::default() });
+        let result = planned_on(POND, &options, Some(&mut qpu)).unwrap();
+        assert_eq!(qpu.used.jobs, 2 * 6);
+        for leg in &result.legs {
+            let first = &leg.rounds[0];
+            assert_eq!(first.loss.len(), 6);
+            assert_eq!(first.qpu.as_ref().unwrap().loss_errors.len(), 6);
+            assert!(leg.rounds[1..].iter().all(|round| round.loss.len() == 1));
+        }
+    }
+
+    #[test]
+    fn a_qpu_that_fails_is_replaced_and_the_result_says_so() {
+        for fails_after in [0, 1] {
+            let mut qpu = IdealQpu { fails_after, ..IdealQpu::new() };
+            let result =
+                planned_on(POND, &options(QpuSettings::default()), Some(&mut qpu)).unwrap();
+            let said = result.fallback().unwrap();
+            assert!(said.contains("the local engine instead of ideal: out of order"), "{said}");
+            assert!(engines(&result).contains(&EngineKind::Chain));
+        }
+    }
+
+    #[test]
+    fn where_no_fallback_is_allowed_there_is_no_plan() {
+        let mut qpu = IdealQpu { fails_after: 0, ..IdealQpu::new() };
+        let options = options(QpuSettings { fallback: false, ..QpuSettings::default() });
+        let error = planned_on(POND, &options, Some(&mut qpu)).unwrap_err();
+        assert!(error.is_qpu_failure() && !error.is_no_path(), "{error}");
+    }
+
+    #[test]
+    fn the_ibm_engine_without_a_qpu_is_an_error_and_no_simulation() {
+        let error = planned_on(POND, &options(QpuSettings::default()), None).unwrap_err();
+        assert!(error.to_string().contains("the ibm engine is no simulator"), "{error}");
+    }
+}

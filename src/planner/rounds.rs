@@ -18,8 +18,8 @@ use super::trellis::{EdgeJudge, Trellis};
 use crate::geodesy::Xy;
 use crate::qaoa::qpu::QpuError;
 use crate::qaoa::{
-    Angles, AnglesSource, Bits, EngineError, EngineKind, Objective, Qaoa, QaoaRun, RunSettings,
-    Scale, Settled, TrainSettings,
+    Angles, AnglesSource, Bits, EngineChoice, EngineError, EngineKind, Objective, Qaoa, QaoaRun,
+    RunSettings, Scale, Settled, TrainSettings,
 };
 use crate::stop::{Stop, Stopped};
 
@@ -219,6 +219,9 @@ impl<'a> Contest<'a> {
         others: &[Candidate],
         mut watch: impl FnMut(&Round),
     ) -> Result<Contested, RoundError> {
+        if self.settings.engine == EngineChoice::Only(EngineKind::Ibm) {
+            return Err(EngineError::NoQpu.into());
+        }
         let cut_short = match self.all_rounds(others, &mut watch) {
             Ok(()) => false,
             Err(RoundError::Stopped(Stopped::DeadlinePassed)) => true,

@@ -91,7 +91,7 @@ impl std::str::FromStr for QpuTraining {
 }
 
 /// How a leg is planned on a QPU.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct QpuSettings {
     /// Where angles are trained.
     pub training: QpuTraining,

@@ -5,7 +5,10 @@ use std::time::Duration;
 use super::Run;
 use crate::formats::{Scenario, read_scenario};
 use crate::geodesy::LatLon;
-use crate::replan::{Field, Input, Options, Replanned, Verdict, fields, judge, replan};
+use crate::qaoa::qpu::Qpu;
+use crate::replan::{
+    Field, Input, Options, ReplanError, Replanned, Verdict, fields, judge, replan, replan_with,
+};
 use crate::stop::Stop;
 
 /// A field to stay inside with a pond; two legs go through the pond.
@@ -30,6 +33,15 @@ fn with_input<T>(scenario: &Scenario, use_it: impl FnOnce(&Input<'_>) -> T) -> T
 
 pub(crate) fn planned(plan: &str, options: &Options) -> Replanned {
     with_input(&scenario(plan), |input| replan(input, options, &Stop::new(), |_| {}).unwrap())
+}
+
+/// The same on a QPU.
+pub(crate) fn planned_on(
+    plan: &str,
+    options: &Options,
+    qpu: Option<&mut dyn Qpu>,
+) -> Result<Replanned, ReplanError> {
+    with_input(&scenario(plan), |input| replan_with(input, options, qpu, &Stop::new(), |_| {}))
 }
 
 /// The same mission without its fences: nothing to keep away from.

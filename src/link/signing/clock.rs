@@ -29,8 +29,12 @@ impl Timestamp {
     }
 }
 
-/// The name of the file in the state directory.
-const FILE: &str = "signing-timestamp";
+/// The file of one link in the state directory. Links with one key differ in their id, so each has
+/// its own time.
+fn file_name(link_id: u8) -> String {
+    format!("signing-timestamp-{link_id}")
+}
+
 /// The file is written again when this much of what it holds in advance is left.
 const LEAST_AHEAD: u64 = 10 * Timestamp::PER_SECOND;
 /// How far the file lies ahead. After a sudden end the next run starts there, so it stays well
@@ -72,13 +76,13 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// Goes on after the last run that used this directory, or at the time of the system where
-    /// that is later.
+    /// Goes on after the last run of this link that used this directory, or at the time of the
+    /// system where that is later.
     ///
     /// # Errors
     /// [`TimestampError`]: without the file a timestamp might come a second time.
-    pub(super) fn open(directory: &Path) -> Result<Self, TimestampError> {
-        let path = directory.join(FILE);
+    pub(super) fn open(directory: &Path, link_id: u8) -> Result<Self, TimestampError> {
+        let path = directory.join(file_name(link_id));
         let failed = |source| TimestampError::File { path: path.clone(), source };
         let stored = match fs::read_to_string(&path) {
             Ok(text) => match text.trim().parse() {
@@ -164,7 +168,7 @@ mod tests {
     #[test]
     fn no_timestamp_comes_twice_also_after_a_sudden_end() {
         let directory = tempfile::tempdir().unwrap();
-        let mut clock = Clock::open(directory.path()).unwrap();
+        let mut clock = Clock::open(directory.path(), 3).unwrap();
         // Somebody's clock is a year ahead: that of this machine no longer counts.
         let ahead = Timestamp(clock.now().0 + 365 * 86_400 * Timestamp::PER_SECOND);
         clock.raise(ahead);
@@ -175,11 +179,11 @@ mod tests {
             used = next;
         }
         // No close: the program was killed.
-        let mut clock = Clock::open(directory.path()).unwrap();
+        let mut clock = Clock::open(directory.path(), 3).unwrap();
         assert!(clock.next() > used);
         let used = clock.next();
         clock.close();
-        let next = Clock::open(directory.path()).unwrap().next();
+        let next = Clock::open(directory.path(), 3).unwrap().next();
         assert!(next > used && next.0 < used.0 + 10, "a clean end costs nothing");
     }
 
@@ -187,8 +191,8 @@ mod tests {
     fn a_file_without_a_timestamp_is_an_error() {
         let directory = tempfile::tempdir().unwrap();
         for content in ["", "soon", "-1", "99999999999999999"] {
-            fs::write(directory.path().join(FILE), content).unwrap();
-            let error = Clock::open(directory.path()).unwrap_err();
+            fs::write(directory.path().join(file_name(3)), content).unwrap();
+            let error = Clock::open(directory.path(), 3).unwrap_err();
             assert!(matches!(error, TimestampError::Content { .. }), "{error}");
         }
     }

@@ -142,7 +142,7 @@ impl Signer {
     /// [`SigningError`].
     pub fn open(settings: &SigningSettings, state_directory: &Path) -> Result<Self, SigningError> {
         let key = settings.key.read()?;
-        let clock = Clock::open(state_directory)?;
+        let clock = Clock::open(state_directory, settings.link_id)?;
         Ok(Self::new(key, settings.unsigned, settings.link_id, clock))
     }
 

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use crate::planner::{CandidateSource, Rounds};
-use crate::qaoa::EngineChoice;
+use crate::planner::{CandidateSource, QpuSettings, Rounds};
+use crate::qaoa::{EngineChoice, EngineKind};
 use crate::replan::Options;
 use crate::units::Metres;
 
@@ -40,6 +40,9 @@ pub struct SettingsDocument {
     pub lambda: Metres,
     /// `auto` or the engine asked for.
     pub engine: String,
+    /// How a QPU is used; only with the ibm engine.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub qpu: Option<QpuSettings>,
     /// Whether every round is trained in full.
     pub full_training: bool,
     /// `auto` or the zone of all legs.
@@ -75,6 +78,8 @@ impl From<&Options> for SettingsDocument {
                 EngineChoice::Auto => "auto".to_owned(),
                 EngineChoice::Only(kind) => kind.to_string(),
             },
+            qpu: (settings.engine == EngineChoice::Only(EngineKind::Ibm))
+                .then(|| settings.qpu.clone()),
             full_training: settings.full_training,
             zone: options.zone.map_or_else(|| "auto".to_owned(), |zone| zone.to_string()),
             inclusion: options.inclusion.to_string(),
