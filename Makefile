@@ -9,7 +9,7 @@ PACKAGES := cmake g++ make pkg-config sqlite3 libsqlite3-dev python3-venv system
 
 TOOLS := target/tools
 
-.PHONY: all build demo ibm-demo deb test-deb soak daemon-figures test test-rust test-python test-ibm lint doc \
+.PHONY: all build demo ibm-demo faults deb test-deb soak daemon-figures test test-rust test-python test-ibm lint doc \
 	bench bench-table bench-peers bench-link bench-ibm fuzz examples gallery reference clean system
 
 all: build
@@ -45,6 +45,15 @@ build: system
 # The main job: a fake vehicle with a mission through no-fly areas, re-planned, uploaded, verified.
 demo: build $(VENV)/.ready
 	$(VENV)/bin/python sitl/demo.py --quavd $(BIN) --scenario fence_examples/s1.plan --out out
+
+# The fault campaign at length: prints a table for each part, and the seeds of any run that failed.
+FAULT_RUNS ?= 2000
+FAULT_SEED ?= 1
+FAULT_WORKERS ?= 24
+faults: build $(VENV)/.ready
+	QUAV_PYTHON=$(CURDIR)/$(VENV)/bin/python QUAV_FAULT_RUNS=$(FAULT_RUNS) QUAV_FAULT_SEED=$(FAULT_SEED) \
+		QUAV_FAULT_WORKERS=$(FAULT_WORKERS) $(CARGO) test --release --locked --test it campaign:: -- \
+		--nocapture --test-threads 1
 
 # A Debian package: program, unit, example configuration, man pages, completions.
 deb: build $(TOOLS)/bin/cargo-deb

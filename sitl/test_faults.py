@@ -136,6 +136,16 @@ class OnPlans(WithFiles):
                     client.upload(mission(6))
                     self.assertEqual(len(client.download()), 3)
 
+    def test_a_mis_stored_item_is_accepted_and_comes_back_false(self):
+        for persona in PERSONAS:
+            fault = "mis-store:item=2,field=x,value=77,times=1"
+            with self.subTest(persona), Fake("--persona", persona, "--fault", fault) as fake:
+                with fake.client() as client:
+                    client.upload(mission(4))
+                    self.assertEqual(client.download()[2].x, 77)
+                    client.upload(mission(4))
+                    self.assertEqual(places(client.download())[2], places(mission(4))[2])
+
     def test_busy_denies_until_its_time_is_over(self):
         for persona, code in (("ardupilot", 14), ("px4", 1)):
             with self.subTest(persona), Fake("--persona", persona) as fake, fake.client() as client:
@@ -226,6 +236,34 @@ class OnPlans(WithFiles):
 
 
 class ControlAndScript(WithFiles):
+    def test_wait_answers_when_the_event_happens_and_gives_up_after_its_time(self):
+        with Fake() as fake, fake.client() as client:
+            self.assertFalse(fake.command(cmd="wait", on="upload_item", **{"for": 0.05})["ok"])
+            client.count(4)
+            answer = fake.command(cmd="wait", on="statustext", **{"for": 0.01})
+            self.assertFalse(answer["ok"])
+            fake.control_file.write(json.dumps({"cmd": "wait", "on": "upload_item", "where": {"item": 1}}) + "\n")
+            fake.control_file.flush()
+            for seq in range(2):
+                client.expect("MISSION_REQUEST", where=lambda m: m.seq == seq)
+                client.item(seq, waypoint(seq))
+            answer = json.loads(fake.control_file.readline())
+            self.assertEqual((answer["ok"], answer["fields"]["item"]), (True, 1))
+
+    def test_reset_leaves_nothing_of_what_was_before(self):
+        for persona in PERSONAS:
+            with self.subTest(persona), Fake("--persona", persona, "--fault", "drop:p=0.9") as fake:
+                fake.command(cmd="set", armed=True, mission=[waypoint(n).to_json(n) for n in range(3)])
+                fake.command(cmd="fault", spec="reboot:at=0.2")
+                fake.command(cmd="reset", seed=9)
+                dump = fake.dump()
+                self.assertEqual((dump["mission"]["count"], dump["armed"], dump["faults"], dump["seed"]),
+                                 (0, False, [], 9))
+                with fake.client() as client:
+                    client.upload(mission(3))
+                    self.assertEqual(len(client.download()), 3)
+                    self.assertEqual(fake.dump()["boots"], 1)
+
     def test_set_changes_what_the_peer_sees(self):
         with Fake() as fake, fake.client() as client:
             answer = fake.command(cmd="set", armed=True, mode="AUTO", mission=[waypoint(1).to_json(0)], current=1,

@@ -5,12 +5,20 @@ import importlib
 import json
 import os
 
+from qiskit.circuit import Parameter
+from qiskit.circuit.library import RXGate, RZZGate
+
 # Name of the QPU -> fake backend, processor as `GET /backends` has it, queue length.
 KNOWN = {
     "ibm_kyiv": ("FakeKyiv", {"family": "Eagle", "revision": "3"}, 3),
     "ibm_fez": ("FakeFez", {"family": "Heron", "revision": "2"}, 121),
+    "ibm_kingston": ("FakeKingston", {"family": "Heron", "revision": "2"}, 52),
     "ibm_marrakesh": ("FakeMarrakesh", {"family": "Heron", "revision": "2"}, 14),
 }
+
+# QPUs that also offer the fractional gates of the live Herons. The fake backends leave them out of the configuration and
+# the target, though their properties have the calibration.
+FRACTIONAL = {"ibm_kingston"}
 
 
 class Qpu:
@@ -32,10 +40,20 @@ class Qpu:
         self.properties = document(self.backend.props_filename)
         for recorded in (self.configuration, self.properties):
             recorded["backend_name"] = name
+        if name in FRACTIONAL:
+            self.configuration["basis_gates"] += ["rx", "rzz"]
+            self.configuration["gates"] += [
+                {"name": gate, "parameters": ["theta"], "qasm_def": "", "coupling_map": qubits}
+                for gate, qubits in (("rx", [[q] for q in range(self.qubits)]), ("rzz", self.configuration["coupling_map"]))]
 
     @functools.cached_property
     def target(self):
-        return self.backend.target
+        target = self.backend.target
+        if self.name in FRACTIONAL:
+            ones = {(q,): None for q in range(self.qubits)}
+            target.add_instruction(RXGate(Parameter("theta")), ones, name="rx")
+            target.add_instruction(RZZGate(Parameter("theta")), {pair: None for pair in target["cz"]}, name="rzz")
+        return target
 
     @property
     def version(self):

@@ -185,6 +185,7 @@ class ArduPilotMissionServer(MissionServer):
                 stored = home_item(self.vehicle.home)  # a home slot full of zeros or NaN is no matter
             else:
                 return refusal.code
+        stored = self.mis_stored(upload.mission_type, seq, stored)
         if upload.mission_type == FENCE:
             upload.staged.append(stored)
             return mavlink.MAV_MISSION_ACCEPTED

@@ -45,6 +45,8 @@ def parser():
     add("--link", action="append", metavar="URL", help="a link to open, see above")
     add("--baud", type=int, metavar="N", help="pace every pty link to this baud rate, both ways")
     add("--sysid", type=int, default=1, help="MAVLink system id (default: 1); the component is always 1")
+    add("--uid", type=int, default=0x66616B65, metavar="N",
+        help="the flight controller's own number, in AUTOPILOT_VERSION; 0: it has none")
     add("--mission", metavar="FILE", help="what it holds: a .plan (mission, fence and rally) or QGC WPL 110 file")
     add("--fence", metavar="FILE", help="the fence, from a .plan or waypoint file")
     add("--rally", metavar="FILE", help="the rally points, from a .plan or waypoint file")
@@ -174,7 +176,8 @@ def make_vehicle(arguments):
     seed = arguments.seed if arguments.seed is not None else random.SystemRandom().randrange(2**32)
     complain(f"seed {seed}")
     vehicle = Vehicle(persona, sysid=arguments.sysid, home=home, seed=seed, speedup=arguments.speedup,
-                      streams_hz=arguments.stream_rate, capacities=capacities, signing=signing)
+                      streams_hz=arguments.stream_rate, capacities=capacities, signing=signing,
+                      uid=arguments.uid)
     for mission_type, items in plans.items():
         try:
             vehicle.load(mission_type, items)

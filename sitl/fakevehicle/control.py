@@ -27,6 +27,10 @@ COMMAND_HELP = """control commands (--control, --script), one JSON object per li
   {"cmd": "clear-faults", "number": 2}   removes one fault, or all of them without a number
   {"cmd": "reboot", "for": 1.0}          down for that long
   {"cmd": "vanish"}                      silent for good
+  {"cmd": "wait", "on": "upload_item", "where": {"item": 3}, "nth": 1, "for": 10}
+                                         answers when that has happened (or after `for` seconds: an error);
+                                         only on the control channel
+  {"cmd": "reset", "seed": 7}            as just started, with empty plans and this seed; links stay open
   {"cmd": "gcs-upload", "type": "mission", "items": X, "pace": 0.05, "stop": 3}
                                          another ground station (255/190) uploads X over the protocol, one item
                                          per pace seconds, giving up silently after `stop` items if given; X as
@@ -54,8 +58,7 @@ class Controller:
         handler = {
             "dump": self._dump, "set": self._set, "fault": self._fault, "clear-faults": self._clear_faults,
             "reboot": self._reboot, "vanish": self._vanish, "statustext": self._statustext,
-            "inject": self._inject,
-            "gcs-upload": self._gcs_upload, "quit": self._quit,
+            "inject": self._inject, "gcs-upload": self._gcs_upload, "reset": self._reset, "quit": self._quit,
         }.get(command.get("cmd"))
         if handler is None:
             raise CommandError(f"unknown cmd {command.get('cmd')!r}")
@@ -103,6 +106,31 @@ class Controller:
     def _vanish(self, _command):
         self.vehicle.vanish()
 
+    def _reset(self, command):
+        self.vehicle.reset(int(command.get("seed", 0)))
+
+    async def wait(self, command):
+        """For an event that has not happened yet."""
+        happened = asyncio.get_running_loop().create_future()
+        left = int(command.get("nth", 1))
+
+        def listener(name, fields):
+            nonlocal left
+            if name == command["on"] and _fits(fields, command.get("where", {})):
+                left -= 1
+                if left == 0 and not happened.done():
+                    happened.set_result(fields)
+
+        listeners = self.vehicle.log.listeners
+        listeners.append(listener)
+        try:
+            return {"ok": True, "fields": await asyncio.wait_for(happened, float(command.get("for", 10)))}
+        except asyncio.TimeoutError:
+            return {"ok": False, "error": f"no {command['on']}"}
+        finally:
+            if listener in listeners:
+                listeners.remove(listener)
+
     def _gcs_upload(self, command):
         mission_type = TYPE_NUMBERS[command.get("type", "mission")]
         GroundStation(self.vehicle).upload(mission_type, _items(command["items"], mission_type),
@@ -149,7 +177,8 @@ class Controller:
                     command = _json(line)
                     if not isinstance(command, dict):
                         raise CommandError("a command is a JSON object")
-                    answer = self.execute(command)
+                    waits = command.get("cmd") == "wait" and isinstance(command.get("on"), str)
+                    answer = await self.wait(command) if waits else self.execute(command)
                 except ValueError as error:  # CommandError and bad JSON alike
                     answer = {"ok": False, "error": str(error)}
                 writer.write(json.dumps(answer).encode() + b"\n")
@@ -189,7 +218,7 @@ class Script:
     def _on_event(self, name, fields):
         for where, command in list(self.waiting):
             conditions = command.get("where", {})
-            if command["on"] != name or any(fields.get(key) != value for key, value in conditions.items()):
+            if command["on"] != name or not _fits(fields, conditions):
                 continue
             self.left[where] -= 1
             if self.left[where] == 0:
@@ -201,6 +230,10 @@ class Script:
             self.controller.execute(command)
         except CommandError as error:
             self.complain(f"{where}: {error}")
+
+
+def _fits(fields, conditions):
+    return all(fields.get(key) == value for key, value in conditions.items())
 
 
 def _items(source, mission_type):

@@ -76,6 +76,8 @@ FRAMES = {"p": (_probability, 1.0), "dir": (_choice("rx", "tx", "both"), "both")
 PLANS = {"type": (_mission_type, None)}
 WHEN = {"when": (_choice("upload", "download"), "upload"), "item": (_whole, None), "at": (_seconds, None)}
 
+FIELD = (_choice("param1", "param2", "param3", "param4", "x", "y", "z", "frame", "command"), "z")
+
 # kind -> (group of common keys, own keys {name: (parser, default)}, help)
 KINDS = {
     "drop": (FRAMES, {}, "lose the frame"),
@@ -96,9 +98,10 @@ KINDS = {
     "vanish-fence": ({}, {"after": (_seconds, 0.6)}, "erase a fence this long after it was accepted"),
     "lying-count": (PLANS, {"delta": (int, 1), "count": (_whole, None)},
                     "announce a false count for a download: the true one plus delta, or count"),
-    "bad-value": (PLANS, {"item": (_whole, None), "field": (_choice(
-        "param1", "param2", "param3", "param4", "x", "y", "z", "frame", "command"), "z"), "value": (_value, math.nan)},
+    "bad-value": (PLANS, {"item": (_whole, None), "field": FIELD, "value": (_value, math.nan)},
         "send this value in a downloaded item (what is stored stays right)"),
+    "mis-store": (PLANS, {"item": (_whole, 1), "field": FIELD, "value": (_value, math.nan)},
+                  "accept an item but store it with this value (as it comes back from storage)"),
     "reboot": (PLANS, {**WHEN, "for": (_seconds, 1.0), "close": (_whole, 0)},
                "restart at a time (at=S) or after an item went through (item=K): transfers, routes and stream rates "
                "are forgotten, storage is kept, silent for `for` seconds; close=1 also closes TCP connections"),
@@ -139,7 +142,7 @@ class Fault:
         return age < self.options["for"]
 
     def spoil(self, item):
-        """For bad-value: the item with one field replaced."""
+        """For bad-value and mis-store: the item with one field replaced."""
         name, value = self.options["field"], self.options["value"]
         if name.startswith("param"):
             params = list(item.params)
@@ -205,6 +208,10 @@ class Faults:
         fault.number, fault.added = self.numbers, self.clock()
         self.faults.append(fault)
         return fault
+
+    def reset(self, seed):
+        """As if just made, with this seed."""
+        self.__init__(seed, self.clock)
 
     def clear(self, number=None):
         """Removes one fault, or all."""

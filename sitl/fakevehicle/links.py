@@ -53,6 +53,7 @@ class Channel:
         self.heard = {}      # (system, component) of everybody heard here, oldest first
         self.intervals = {}  # message id -> timer, see telemetry
         self.incoming, self.outgoing = Wire(vehicle.loop), Wire(vehicle.loop)
+        self.closed = False
         self.counts = {"rx": 0, "tx": 0, "rx_bad": 0, "rx_lost": 0, "tx_lost": 0}
 
     def send(self, message):
@@ -101,10 +102,11 @@ class Channel:
             self.incoming.push(message, verdict, self._deliver)
 
     def _deliver(self, message):
-        if not self.vehicle.down:
+        if not (self.vehicle.down or self.closed):
             self.vehicle.receive(self, message)
 
     def close(self):
+        self.closed = True
         self.vehicle.channel_closed(self)
 
 

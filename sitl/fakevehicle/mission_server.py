@@ -112,6 +112,11 @@ class MissionServer:
         cut = self.vehicle.faults.take("half-write", mission_type=mission_type)
         return cut.options["item"] if cut else None
 
+    def mis_stored(self, mission_type, seq, item):
+        """For the mis-store fault: what storage makes of an item."""
+        fault = self.vehicle.faults.take("mis-store", mission_type=mission_type, item=seq)
+        return fault.spoil(item) if fault else item
+
     @staticmethod
     def received_item(msg):
         return Item.from_float_item(msg) if msg.get_type() == "MISSION_ITEM" else Item.from_item_int(msg)

@@ -172,7 +172,8 @@ class Px4MissionServer(MissionServer):
         code = self.refusal_of_item(self.mission_type, msg.seq)
         if code is None:
             try:
-                upload.staged.append(store(self.mission_type, item))
+                stored = store(self.mission_type, item)
+                upload.staged.append(self.mis_stored(self.mission_type, msg.seq, stored))
             except Refused as refusal:
                 code = refusal.code
         if code is not None and code != mavlink.MAV_MISSION_ACCEPTED:

@@ -18,6 +18,10 @@ class EventLog:
 
     def __init__(self, clock):
         self.clock = clock
+        self.reset()
+
+    def reset(self):
+        """Forgets everything, listeners too."""
         self.counts = Counter()
         self.last = deque(maxlen=LAST_EVENTS)
         self.uploads = deque(maxlen=LAST_UPLOADS)

@@ -126,7 +126,7 @@ class Telemetry:
         version = self.vehicle.persona.flight_version
         capabilities = CAPABILITIES | (mavlink.MAV_PROTOCOL_CAPABILITY_FTP if self.vehicle.persona.serves_files else 0)
         return mavlink.MAVLink_autopilot_version_message(
-            capabilities, version, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0x66616B65)
+            capabilities, version, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, self.vehicle.uid)
 
     def fence_status(self):
         return mavlink.MAVLink_fence_status_message(0, 0, 0, 0)

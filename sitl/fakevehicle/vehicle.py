@@ -22,7 +22,9 @@ LEAST_HEARTBEAT_S = 0.02
 
 class Vehicle:
     def __init__(self, persona, sysid=1, home=None, seed=0, speedup=1.0, streams_hz=None, capacities=None,
-                 signing=None):
+                 signing=None, uid=0):
+        self.uid = uid
+        self.life = 1  # rises with each reset
         self.loop = asyncio.get_running_loop()
         self.started = self.booted = self.loop.time()
         self.persona, self.sysid, self.speedup = persona, sysid, speedup
@@ -95,6 +97,8 @@ class Vehicle:
             return False
         self.current_seq = seq
         self.event("current", seq=seq)
+        if not self.persona.home_is_item_zero:  # PX4 tells at once, ArduPilot in its stream
+            self.broadcast(self.telemetry.mission_current())
         return True
 
     # ---- plans
@@ -133,9 +137,11 @@ class Vehicle:
                 self.erase_fence_after(vanish.options["after"])
 
     def erase_fence_after(self, seconds):
-        self.loop.call_later(seconds, self._erase_fence)
+        self.loop.call_later(seconds, self._erase_fence, self.life)
 
-    def _erase_fence(self):
+    def _erase_fence(self, life):
+        if life != self.life:
+            return
         self.store.items[FENCE] = []
         self.event("fence_erased")
         self.plan_changed(FENCE)
@@ -216,9 +222,11 @@ class Vehicle:
         self.armed, self.mode, self.current_seq = False, self.persona.default_mode, 0
         for link in {channel.link for channel in self.channels}:
             link.rebooted(close_links)
-        self.loop.call_later(down_s, self._up_again)
+        self.loop.call_later(down_s, self._up_again, self.life)
 
-    def _up_again(self):
+    def _up_again(self, life):
+        if life != self.life:
+            return
         self.boots += 1
         self.booted = self.loop.time()
         self.down = self.vanished
@@ -232,6 +240,27 @@ class Vehicle:
         self.down = self.vanished = True
         for server in self.servers.values():
             server.reset()
+
+    def reset(self, seed):
+        """Another vehicle in the same place: nothing is held, open, known or wrong. Only links stay."""
+        self.life += 1
+        for server in self.servers.values():
+            server.reset()
+        self.ftp.reset()
+        for channel in self.channels:
+            self.telemetry.stop(channel)
+            channel.heard.clear()
+        for link in {channel.link for channel in self.channels}:
+            link.rebooted(True)
+        self.faults.reset(seed)
+        self.log.reset()
+        self.log.listeners.append(self._fault_events)
+        for mission_type in self.store.items:
+            self.store.items[mission_type] = []
+        self.home = self.position = tuple(self.persona.home)
+        self.armed, self.mode, self.current_seq = False, self.persona.default_mode, 0
+        self.boots, self.down, self.vanished = 1, False, False
+        self.booted = self.loop.time()
 
     # ---- faults that act on the vehicle as a whole
 

@@ -100,6 +100,26 @@ class Noisy(unittest.TestCase):
         exact = np.abs(state) ** 2 @ (signs @ np.array(H) + (signs[:, :-1] * signs[:, 1:]) @ np.array(J))
         self.assertLess(abs(energy.mean() - exact), 5 * energy.std() / np.sqrt(len(energy)))
 
+    def test_fractional_gates_have_their_calibrated_errors(self):
+        noise = noisy.noise_of(FakeKingston())
+        recorded = FakeKingston().properties()
+        pair = tuple(HERON[:2])
+        chances = dict(noise.paulis("rzz", pair))
+        # An average infidelity e of two qubits is a Pauli error with probability 5/4 e.
+        self.assertAlmostEqual(1 - chances["II"], 1.25 * recorded.gate_error("rzz", list(pair)), places=9)
+        chances = dict(noise.paulis("rx", pair[:1]))
+        self.assertAlmostEqual(1 - chances["I"], 1.5 * recorded.gate_error("rx", [pair[0]]), places=9)
+        circuit = QuantumCircuit(4, 4)
+        circuit.rx(0.7, range(4))
+        for i in range(3):
+            circuit.rzz(0.9, i, i + 1)
+            circuit.rx(-1.1, i)
+        circuit.measure(range(4), range(4))
+        mine = histogram(noisy.on_a_line(circuit, HERON[:4], noise, self.SHOTS, 4))
+        aer = histogram(noisy.with_aer(circuit, HERON[:4], noise, self.SHOTS, 5))
+        statistic, freedom = two_samples(mine, aer)
+        self.assertLess(statistic, freedom + 5 * np.sqrt(2 * freedom))
+
     def test_what_is_no_line_is_left_to_aer(self):
         ring = QuantumCircuit(3, 3)
         ring.x(0)

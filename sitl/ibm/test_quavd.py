@@ -180,7 +180,7 @@ class Retirement(Case):
         code, _, stderr = quavd.run("plan", S5, "--engine", "ibm", "--paper", "--no-fallback")
         self.assertEqual(code, 6)
         self.assertIn("ibm_kyiv was retired on 2025-04-18", stderr)
-        self.assertIn("ibm_fez, ibm_marrakesh", stderr)
+        self.assertIn("ibm_fez, ibm_kingston, ibm_marrakesh", stderr)
         document = self.planned_on_the_qpu(quavd.plan(backend="least_busy"))
         self.assertEqual(document["qpu"]["backend"], "ibm_marrakesh")
 

@@ -189,6 +189,10 @@ pub struct PlanningArgs {
     /// What being near an obstacle costs, metres: λ of λ·exp(−d/buffer). Higher keeps further off.
     #[arg(long, default_value_t = 0.05, value_parser = lambda, value_name = "M")]
     pub lambda: f64,
+    /// Most waypoints to insert in all; corners are merged until that is kept, the path getting
+    /// longer.
+    #[arg(long, value_name = "N")]
+    pub max_waypoints: Option<u16>,
     /// QAOA engine: auto, chain, statevector, or ibm (a QPU; see the options below).
     #[arg(long, default_value = "auto", value_name = "ENGINE")]
     pub engine: EngineChoice,
@@ -251,7 +255,13 @@ impl SafetyArgs {
     #[must_use]
     pub fn options(&self) -> Options {
         let settings = Settings { buffer: Metres(self.buffer), ..Settings::default() };
-        Options { settings, zone: self.zone.0, inclusion: self.inclusion, deadline: None }
+        Options {
+            settings,
+            zone: self.zone.0,
+            inclusion: self.inclusion,
+            most_waypoints: None,
+            deadline: None,
+        }
     }
 }
 
@@ -297,6 +307,7 @@ impl PlanningArgs {
             ..base
         };
         let deadline = self.deadline.map(Duration::from_secs_f64);
-        Options { settings, deadline, ..self.safety.options() }
+        let most_waypoints = self.max_waypoints.map(usize::from);
+        Options { settings, deadline, most_waypoints, ..self.safety.options() }
     }
 }

@@ -104,10 +104,6 @@ pub struct QubitCalibration {
     pub rx: Option<Calibration>,
     /// The readout.
     pub readout: Option<Readout>,
-    /// Relaxation time.
-    pub t1: Option<Nanoseconds>,
-    /// Dephasing time.
-    pub t2: Option<Nanoseconds>,
 }
 
 impl QubitCalibration {
@@ -122,13 +118,10 @@ impl QubitCalibration {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Device {
     pub(super) name: String,
-    pub(super) version: Option<String>,
-    pub(super) processor: Option<String>,
     pub(super) calibrated: Option<String>,
     pub(super) qubits: Vec<QubitCalibration>,
     pub(super) couplers: BTreeMap<Entangler, BTreeMap<(PhysicalQubit, PhysicalQubit), Calibration>>,
     pub(super) has_rx: bool,
-    pub(super) dt: Option<Nanoseconds>,
     pub(super) rep_delay: Option<Nanoseconds>,
 }
 
@@ -137,18 +130,6 @@ impl Device {
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
-    }
-
-    /// Version of the backend, where IBM says so.
-    #[must_use]
-    pub fn version(&self) -> Option<&str> {
-        self.version.as_deref()
-    }
-
-    /// Processor family and revision, for instance `Eagle r3`.
-    #[must_use]
-    pub fn processor(&self) -> Option<&str> {
-        self.processor.as_deref()
     }
 
     /// When the properties were last updated, as IBM writes it (ISO 8601).
@@ -199,12 +180,6 @@ impl Device {
     #[must_use]
     pub fn has_rx(&self) -> bool {
         self.has_rx
-    }
-
-    /// Resolution of its schedule.
-    #[must_use]
-    pub fn dt(&self) -> Option<Nanoseconds> {
-        self.dt
     }
 
     /// Pause between two shots if a job does not ask for another.

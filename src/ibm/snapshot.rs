@@ -18,9 +18,9 @@ use super::device::{
 };
 
 /// The largest device that is believed; IBM's largest has 1121 qubits.
-pub const MAX_QUBITS: usize = 10_000;
+pub const MAX_QUBITS: usize = 2_000;
 /// The most couplers or gate calibrations that are believed.
-const MAX_ENTRIES: usize = 200_000;
+const MAX_ENTRIES: usize = 50_000;
 /// Longer gates and times than this (a second) are no calibration.
 const MAX_LENGTH: f64 = 1e9;
 
@@ -72,8 +72,6 @@ pub enum DeviceError {
 #[derive(Deserialize)]
 struct ConfigurationDocument {
     backend_name: String,
-    #[serde(default, deserialize_with = "lenient_text")]
-    backend_version: Option<String>,
     n_qubits: usize,
     basis_gates: Vec<String>,
     #[serde(default)]
@@ -81,11 +79,7 @@ struct ConfigurationDocument {
     #[serde(default)]
     coupling_map: Option<Vec<(u32, u32)>>,
     #[serde(default, deserialize_with = "lenient_number")]
-    dt: Option<f64>,
-    #[serde(default, deserialize_with = "lenient_number")]
     default_rep_delay: Option<f64>,
-    #[serde(default)]
-    processor_type: Option<ProcessorDocument>,
 }
 
 #[derive(Deserialize)]
@@ -93,14 +87,6 @@ struct GateDocument {
     name: String,
     #[serde(default)]
     coupling_map: Option<Vec<Vec<u32>>>,
-}
-
-#[derive(Deserialize)]
-struct ProcessorDocument {
-    #[serde(default)]
-    family: Option<String>,
-    #[serde(default, deserialize_with = "lenient_text")]
-    revision: Option<String>,
 }
 
 #[derive(Deserialize)]
@@ -136,13 +122,9 @@ fn lenient_number<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f
     Ok(Value::deserialize(deserializer)?.as_f64().filter(|value| value.is_finite()))
 }
 
-/// Text, or a number as text: `"revision"` is a string in one document and an integer in another.
+/// Anything but a text is no text.
 fn lenient_text<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<String>, D::Error> {
-    Ok(match Value::deserialize(deserializer)? {
-        Value::String(text) => Some(text),
-        Value::Number(number) => Some(number.to_string()),
-        _ => None,
-    })
+    Ok(Value::deserialize(deserializer)?.as_str().map(str::to_owned))
 }
 
 impl Device {
@@ -191,22 +173,16 @@ impl Device {
             return Err(DeviceError::Basis { name: configuration.backend_name, basis });
         }
 
-        let processor = configuration.processor_type.and_then(|processor| {
-            let family = processor.family?;
-            Some(processor.revision.map_or(family.clone(), |r| format!("{family} r{r}")))
-        });
-        let positive = |value: Option<f64>| value.filter(|&value| value >= 0.0);
         Ok(Self {
             name: configuration.backend_name,
-            version: configuration.backend_version,
-            processor,
             calibrated: properties.last_update_date,
             couplers,
             has_rx: has_rx && qubits.iter().all(|qubit| !qubit.usable() || qubit.rx.is_some()),
             qubits,
-            dt: positive(configuration.dt).map(Nanoseconds),
-            // IBM gives microseconds.
-            rep_delay: positive(configuration.default_rep_delay).map(|us| Nanoseconds(us * 1e3)),
+            rep_delay: configuration
+                .default_rep_delay
+                .filter(|&delay| delay >= 0.0)
+                .map(|microseconds| Nanoseconds(microseconds * 1e3)),
         })
     }
 }
@@ -301,8 +277,6 @@ fn qubit(
         sx: works("sx").filter(|_| works("x").is_some()),
         rx: works("rx").filter(|_| has_rx),
         readout,
-        t1: length(values, "T1"),
-        t2: length(values, "T2"),
     }
 }
 

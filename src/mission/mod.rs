@@ -14,6 +14,7 @@ mod itinerary;
 mod jumps;
 pub mod legs;
 mod places;
+pub mod remaining;
 pub mod splice;
 #[cfg(test)]
 mod testing;
@@ -22,6 +23,7 @@ pub use autopilot::Autopilot;
 pub use commands::LoiterHabit;
 pub use item::{Command, Frame, MissionItem, MissionType};
 pub use legs::{FlightContext, Leg, LegError, MissionLegs, legs};
+pub use remaining::{RemainingError, rejoined, remaining};
 pub use splice::{Detour, SpliceError, Spliced, splice};
 
 use crate::geodesy::LatLon;

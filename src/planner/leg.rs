@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use super::candidates::{Candidate, candidates};
 use super::enclosure::enclosure;
-use super::finish::{FinishError, Finished, WORTH_OF_FEW, finished, with_few_corners};
+use super::finish::{FinishError, Finished, finished, with_few_corners};
 use super::leg_space::LegSpace;
 use super::polyline::distance;
 use super::rounds::{Contest, Contested, Round, RoundError};
@@ -205,7 +205,7 @@ impl LegPlanner {
         times.qaoa = began.elapsed();
 
         let began = Instant::now();
-        let path = with_few_corners(&path, space, WORTH_OF_FEW);
+        let path = with_few_corners(&path, space, self.settings.corner_allowance);
         let finished = finished(&path, (request.from, request.to), frame, space).map_err(
             |error| match error {
                 FinishError::NotClear(_) if cut_short => Stopped::DeadlinePassed.into(),

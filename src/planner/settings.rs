@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::finish::WORTH_OF_FEW;
 use crate::qaoa::EngineChoice;
 use crate::units::Metres;
 
@@ -146,6 +147,9 @@ pub struct Settings {
     /// Whether every round is trained in full from the ramp, as in the paper. Else only the first
     /// is, and later ones carry the angles over and stop when the loss has settled.
     pub full_training: bool,
+    /// What the waypoints that are saved by merging corners may cost together, as a share of a
+    /// leg's length.
+    pub corner_allowance: f64,
     /// Memory that an engine may use, bytes.
     pub memory_limit: u64,
     /// What is different on a QPU.
@@ -170,6 +174,7 @@ impl Default for Settings {
             lambda: Metres(0.05),
             engine: EngineChoice::Auto,
             full_training: false,
+            corner_allowance: WORTH_OF_FEW,
             memory_limit: 4 << 30,
             qpu: QpuSettings::default(),
         }

@@ -3,12 +3,14 @@
 //!
 //! - [`field`]: frames and airspaces, one for each zone that the mission's legs are in;
 //! - [`mod@judge`]: the verdict on any mission, leg by leg;
+//! - [`fewer`]: re-planning with a limit on the waypoints;
 //! - [`plan`]: re-planning with the judgement of its own result;
 //! - [`reason`]: why there is no plan, in words that name regions and legs.
 //!
 //! Pure: missions and fences in, a mission and its record out. Reading them from a vehicle or a
 //! file and writing them back is done elsewhere.
 
+pub mod fewer;
 pub mod field;
 pub mod judge;
 pub mod plan;
@@ -22,9 +24,10 @@ use crate::geodesy::{LatLon, Zone};
 use crate::mission::{Autopilot, FlightContext, LoiterHabit, Mission};
 use crate::planner::Settings;
 
+pub use fewer::{replan, replan_with};
 pub use field::{Field, FieldError};
 pub use judge::{LegVerdict, Verdict, fields, judge};
-pub use plan::{LegRecord, Progress, Replanned, Stage, replan, replan_with};
+pub use plan::{LegRecord, Progress, Replanned, Stage};
 pub use reason::ReplanError;
 
 /// What a mission is judged or planned with.
@@ -70,6 +73,8 @@ pub struct Options {
     pub zone: Option<Zone>,
     /// What several inclusions mean together.
     pub inclusion: InclusionRule,
+    /// Most waypoints to insert, in all.
+    pub most_waypoints: Option<usize>,
     /// How long planning may take; when that is over, the best clear path until then is used.
     pub deadline: Option<Duration>,
 }

@@ -139,33 +139,17 @@ impl Replanned {
     }
 }
 
-/// Plans a mission: every leg that is not clear is re-planned, the waypoints are spliced in, and
-/// the new mission is judged from its integers. `stop` calls it off; the deadline of the options
-/// counts from now.
+/// Plans a mission as its settings say, with as many waypoints as that takes.
 ///
 /// # Errors
 /// [`ReplanError`] with the reason where there is no safe mission.
-pub fn replan(
-    input: &Input<'_>,
-    options: &Options,
-    stop: &Stop,
-    watch: impl FnMut(Progress<'_>),
-) -> Result<Replanned, ReplanError> {
-    replan_with(input, options, None, stop, watch)
-}
-
-/// [`replan`] with the QAOA rounds on a QPU, if there is one.
-///
-/// # Errors
-/// [`ReplanError`] with the reason where there is no safe mission.
-pub fn replan_with(
+pub(super) fn replan_as_set(
     input: &Input<'_>,
     options: &Options,
     mut qpu: Option<&mut dyn Qpu>,
     stop: &Stop,
-    mut watch: impl FnMut(Progress<'_>),
+    watch: &mut impl FnMut(Progress<'_>),
 ) -> Result<Replanned, ReplanError> {
-    let stop = options.deadline.map_or_else(|| stop.clone(), |time| stop.within(time));
     let flown = legs(input.mission, &input.context())?;
     let fields = Fields::new(&flown.legs, input.fences, options)?;
     let before = verdict(&flown, &fields, input, options)?;
@@ -196,7 +180,7 @@ pub fn replan_with(
                 &request,
                 &zoned.frame,
                 &space,
-                (&stop, legs - k),
+                (stop, legs - k),
                 // A reborrow that ends with the leg.
                 match &mut qpu {
                     Some(qpu) => Some(&mut **qpu),

@@ -65,6 +65,17 @@ pub enum ReplanError {
         /// The region's name.
         region: String,
     },
+    /// The plan needs more waypoints than there may be.
+    #[error(
+        "no plan with at most {most} inserted waypoints was found; the best has {least}. Allow more \
+         (--max-waypoints), or lower --buffer"
+    )]
+    TooManyWaypoints {
+        /// How many there may be.
+        most: usize,
+        /// How many the best plan has.
+        least: usize,
+    },
     /// QAOA failed on a leg.
     #[error("QAOA failed on the {leg}: {cause}")]
     Qaoa {
@@ -106,6 +117,7 @@ impl ReplanError {
                 | Self::Fixed { .. }
                 | Self::Splice(_)
                 | Self::NotVerified { .. }
+                | Self::TooManyWaypoints { .. }
         )
     }
 

@@ -7,8 +7,10 @@
 
 pub mod record;
 
-use std::fs::{self, File, TryLockError};
+use std::collections::BTreeSet;
+use std::fs::{self, DirBuilder, File, TryLockError};
 use std::io::{self, Read, Write};
+use std::os::unix::fs::DirBuilderExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -17,11 +19,11 @@ pub use record::{Outcome, Record, RecordError};
 
 use crate::link::SystemId;
 use crate::mission::{MissionItem, MissionType};
-use crate::vehicle::Autopilot;
+use crate::vehicle::{Uid, VehicleId};
 
 /// Closed records kept for each plan of each vehicle, beside those that are still needed.
 const KEPT: usize = 50;
-/// Larger than any record: three lists of the longest plan there can be.
+/// Larger than any record: five lists of the longest plan there can be.
 const LARGEST_FILE: u64 = 32 * 1024 * 1024;
 const LOCK_FILE: &str = "lock";
 /// Begins the name of a file that is being written and not yet a record.
@@ -83,9 +85,7 @@ struct Directory {
 #[derive(Debug, Clone)]
 pub struct Beginning {
     /// Which vehicle.
-    pub vehicle: SystemId,
-    /// Its flight software.
-    pub autopilot: Autopilot,
+    pub vehicle: VehicleId,
     /// Which of its plans.
     pub mission_type: MissionType,
     /// The pilot's own plan.
@@ -102,7 +102,7 @@ impl Store {
     /// # Errors
     /// [`StoreError::InUse`], [`StoreError::Io`].
     pub fn open(path: &Path) -> Result<Self, StoreError> {
-        fs::create_dir_all(path).map_err(failed("make the directory", path))?;
+        make_directory(path)?;
         let lock_path = path.join(LOCK_FILE);
         let lock = File::options().create(true).truncate(false).write(true).open(&lock_path);
         let lock = lock.map_err(failed("open", &lock_path))?;
@@ -126,7 +126,7 @@ impl Store {
     /// # Errors
     /// [`StoreError`]: then nothing may be written to the vehicle.
     pub fn begin(&self, beginning: Beginning) -> Result<Record, StoreError> {
-        let Beginning { vehicle, autopilot, mission_type, original, before, intended } = beginning;
+        let Beginning { vehicle, mission_type, original, before, intended } = beginning;
         let number = self.numbers()?.into_iter().max().map_or(1, |last| last.saturating_add(1));
         let began = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
         let outcome = Outcome::Started;
@@ -134,16 +134,25 @@ impl Store {
             number,
             outcome,
             vehicle,
-            autopilot,
             mission_type,
             began,
             original,
             before,
             intended,
+            read_back: None,
+            found: None,
         };
         self.write(&record)?;
-        self.forget_old(vehicle, mission_type);
+        self.forget_old(&record);
         Ok(record)
+    }
+
+    /// Writes a record that is still open once more, with what has been learnt since.
+    ///
+    /// # Errors
+    /// [`StoreError`]: what was written before is still there.
+    pub fn update(&self, record: &Record) -> Result<(), StoreError> {
+        self.write(record)
     }
 
     /// Writes down how an upload ended. When this returns, that is on the disk.
@@ -163,7 +172,7 @@ impl Store {
     /// [`StoreError`], also where a record cannot be read: it might be the one.
     pub fn open_record(
         &self,
-        vehicle: SystemId,
+        vehicle: &VehicleId,
         mission_type: MissionType,
     ) -> Result<Option<Record>, StoreError> {
         self.newest(vehicle, mission_type, |record| record.outcome == Outcome::Started)
@@ -175,7 +184,7 @@ impl Store {
     /// [`StoreError`].
     pub fn last_verified(
         &self,
-        vehicle: SystemId,
+        vehicle: &VehicleId,
         mission_type: MissionType,
     ) -> Result<Option<Record>, StoreError> {
         self.newest(vehicle, mission_type, |record| record.outcome == Outcome::Verified)
@@ -187,7 +196,7 @@ impl Store {
     /// [`StoreError`].
     pub fn last(
         &self,
-        vehicle: SystemId,
+        vehicle: &VehicleId,
         mission_type: MissionType,
     ) -> Result<Option<Record>, StoreError> {
         self.newest(vehicle, mission_type, |_| true)
@@ -197,31 +206,41 @@ impl Store {
     #[must_use]
     pub fn path_of(&self, record: &Record) -> PathBuf {
         let Record { mission_type, vehicle, number, .. } = record;
-        self.directory.path.join(format!("{mission_type}-{vehicle}-{number:06}.json"))
+        let name = format!("{mission_type}-{}-{number:06}.json", vehicle.system);
+        self.directory.path.join(name)
     }
 
+    /// The newest record of a vehicle that is wanted. Records of another vehicle with the same
+    /// system id are passed over; an open one among them is mentioned in the log.
     fn newest(
         &self,
-        vehicle: SystemId,
+        vehicle: &VehicleId,
         mission_type: MissionType,
         wanted: impl Fn(&Record) -> bool,
     ) -> Result<Option<Record>, StoreError> {
-        for path in self.files(vehicle, mission_type)?.into_iter().rev() {
+        for path in self.files(vehicle.system, mission_type)?.into_iter().rev() {
             let record = read(&path)?;
-            if wanted(&record) {
+            if !record.vehicle.may_be(vehicle) {
+                if record.outcome == Outcome::Started {
+                    tracing::warn!(
+                        record = %path.display(), of = %record.vehicle, here = %vehicle,
+                        "an upload to another vehicle is not settled"
+                    );
+                }
+            } else if wanted(&record) {
                 return Ok(Some(record));
             }
         }
         Ok(None)
     }
 
-    /// The files of one plan of one vehicle, oldest first.
+    /// The files of one plan of one system, oldest first.
     fn files(
         &self,
-        vehicle: SystemId,
+        system: SystemId,
         mission_type: MissionType,
     ) -> Result<Vec<PathBuf>, StoreError> {
-        let prefix = format!("{mission_type}-{vehicle}-");
+        let prefix = format!("{mission_type}-{system}-");
         let mut files: Vec<_> = self
             .names()?
             .into_iter()
@@ -257,20 +276,19 @@ impl Store {
         file.as_file().sync_all().map_err(failed("write", &path))?;
         file.persist(&path).map_err(|error| failed("write", &path)(error.error))?;
         // The rename itself has to reach the disk as well.
-        let synced = File::open(directory).and_then(|directory| directory.sync_all());
-        synced.map_err(failed("write to", directory))
+        sync_directory(directory)
     }
 
     /// Removes the oldest closed records beyond those kept. Never an open one, nor the newest, nor
-    /// the newest verified. What cannot be removed stays: it is only disk space.
-    fn forget_old(&self, vehicle: SystemId, mission_type: MissionType) {
-        let Ok(files) = self.files(vehicle, mission_type) else { return };
+    /// the newest verified one of each vehicle. What cannot be removed stays: it is only disk space.
+    fn forget_old(&self, newest: &Record) {
+        let Ok(files) = self.files(newest.vehicle.system, newest.mission_type) else { return };
         let mut closed = 0;
-        let mut verified = false;
+        let mut verified: BTreeSet<Option<Uid>> = BTreeSet::new();
         for path in files.into_iter().rev() {
             let Ok(record) = read(&path) else { continue };
             let newest_verified =
-                record.outcome == Outcome::Verified && !std::mem::replace(&mut verified, true);
+                record.outcome == Outcome::Verified && verified.insert(record.vehicle.uid);
             if record.outcome == Outcome::Started || newest_verified {
                 continue;
             }
@@ -282,6 +300,25 @@ impl Store {
             }
         }
     }
+}
+
+/// Makes a directory for the owner only, and those above it, and waits until their names are on
+/// the disk: a record is of no use in a directory that a power cut takes away.
+fn make_directory(path: &Path) -> Result<(), StoreError> {
+    let missing: Vec<_> = path.ancestors().take_while(|above| !above.exists()).collect();
+    let made = DirBuilder::new().recursive(true).mode(0o700).create(path);
+    made.map_err(failed("make the directory", path))?;
+    for above in missing.iter().filter_map(|made| made.parent()) {
+        // The parent of a relative path's first part is the working directory.
+        let above = if above.as_os_str().is_empty() { Path::new(".") } else { above };
+        sync_directory(above)?;
+    }
+    Ok(())
+}
+
+fn sync_directory(path: &Path) -> Result<(), StoreError> {
+    let synced = File::open(path).and_then(|directory| directory.sync_all());
+    synced.map_err(failed("write to", path))
 }
 
 /// The number of `000042.json`.
@@ -302,118 +339,4 @@ fn failed(what: &'static str, path: &Path) -> impl Fn(io::Error) -> StoreError +
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::mission::{Command, Frame};
-
-    const VEHICLE: SystemId = SystemId(1);
-
-    fn item(seq: u16) -> MissionItem {
-        MissionItem {
-            seq,
-            frame: Frame::GLOBAL,
-            command: Command::NAV_WAYPOINT,
-            current: 0,
-            autocontinue: 1,
-            params: [0.0; 4],
-            x: 10,
-            y: 20,
-            z: 30.0,
-        }
-    }
-
-    fn beginning(items: u16) -> Beginning {
-        let original: Vec<_> = (0..items).map(item).collect();
-        Beginning {
-            vehicle: VEHICLE,
-            autopilot: Autopilot::ArduPilot,
-            mission_type: MissionType::Mission,
-            before: original.clone(),
-            intended: original.iter().rev().copied().collect(),
-            original,
-        }
-    }
-
-    fn store() -> (tempfile::TempDir, Store) {
-        let directory = tempfile::tempdir().unwrap();
-        let store = Store::open(directory.path()).unwrap();
-        (directory, store)
-    }
-
-    fn open_record(store: &Store) -> Option<Record> {
-        store.open_record(VEHICLE, MissionType::Mission).unwrap()
-    }
-
-    #[test]
-    fn an_upload_is_open_until_it_is_closed_also_after_a_restart() {
-        let (directory, store) = store();
-        let mut record = store.begin(beginning(3)).unwrap();
-        drop(store);
-        let store = Store::open(directory.path()).unwrap();
-        assert_eq!(open_record(&store).as_ref(), Some(&record));
-        assert_eq!(store.open_record(SystemId(2), MissionType::Mission).unwrap(), None);
-        assert_eq!(store.open_record(VEHICLE, MissionType::Fence).unwrap(), None);
-
-        store.close(&mut record, Outcome::Verified).unwrap();
-        assert_eq!(open_record(&store), None);
-        let verified = store.last_verified(VEHICLE, MissionType::Mission).unwrap();
-        assert_eq!(verified.as_ref(), Some(&record));
-    }
-
-    #[test]
-    fn two_processes_do_not_share_a_directory() {
-        let (directory, store) = store();
-        let second = Store::open(directory.path());
-        assert!(matches!(second, Err(StoreError::InUse { .. })), "{second:?}");
-        drop(store);
-        Store::open(directory.path()).unwrap();
-    }
-
-    #[test]
-    fn old_records_go_but_none_that_is_needed() {
-        let (directory, store) = store();
-        let unsettled = store.begin(beginning(1)).unwrap();
-        let mut verified = store.begin(beginning(2)).unwrap();
-        store.close(&mut verified, Outcome::Verified).unwrap();
-        for _ in 0..2 * KEPT {
-            let mut record = store.begin(beginning(3)).unwrap();
-            store.close(&mut record, Outcome::Restored).unwrap();
-        }
-        let newest = store.begin(beginning(4)).unwrap();
-        assert_eq!(fs::read_dir(directory.path()).unwrap().count(), KEPT + 4, "with the lock");
-        assert_eq!(open_record(&store), Some(newest));
-        let kept = store.last_verified(VEHICLE, MissionType::Mission).unwrap();
-        assert_eq!(kept, Some(verified));
-        assert!(store.path_of(&unsettled).exists());
-    }
-
-    #[test]
-    fn a_damaged_record_is_an_error_and_not_forgotten() {
-        let (_directory, store) = store();
-        let record = store.begin(beginning(2)).unwrap();
-        let path = store.path_of(&record);
-        let bytes = fs::read(&path).unwrap();
-        fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
-        let read = store.open_record(VEHICLE, MissionType::Mission);
-        let error = read.unwrap_err().to_string();
-        assert!(
-            error.contains("mission-1-000001.json") && error.contains("move it away"),
-            "{error}"
-        );
-        assert_eq!(store.begin(beginning(2)).unwrap().number, 2, "its number is not used again");
-    }
-
-    #[test]
-    fn what_a_dying_process_left_behind_is_no_record() {
-        let directory = tempfile::tempdir().unwrap();
-        let unfinished = directory.path().join(format!("{UNFINISHED}Ab12"));
-        let foreign = directory.path().join("notes.txt");
-        fs::write(&unfinished, b"{\"version\":1").unwrap();
-        fs::write(&foreign, b"mine").unwrap();
-        let store = Store::open(directory.path()).unwrap();
-        assert!(!unfinished.exists() && foreign.exists());
-        assert_eq!(open_record(&store), None);
-        let record = store.begin(beginning(1)).unwrap();
-        assert_eq!(open_record(&store), Some(record));
-    }
-}
+mod tests;

@@ -5,7 +5,8 @@ use sha2::{Digest, Sha256};
 
 use crate::link::SystemId;
 use crate::mission::{Command, Frame, MissionItem, MissionType};
-use crate::vehicle::Autopilot;
+use crate::vehicle::identity::UidError;
+use crate::vehicle::{Autopilot, Uid, VehicleId};
 
 /// How an upload ended, as far as is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -29,9 +30,7 @@ pub struct Record {
     /// How it ended.
     pub outcome: Outcome,
     /// Which vehicle.
-    pub vehicle: SystemId,
-    /// Its flight software.
-    pub autopilot: Autopilot,
+    pub vehicle: VehicleId,
     /// Which of its plans.
     pub mission_type: MissionType,
     /// When it began, seconds since 1970 by this machine's clock.
@@ -43,6 +42,12 @@ pub struct Record {
     pub before: Vec<MissionItem>,
     /// What is uploaded.
     pub intended: Vec<MissionItem>,
+    /// What was read back when the new plan was proven. It differs from [`Record::intended`] where
+    /// the autopilot's storage does not keep everything.
+    pub read_back: Option<Vec<MissionItem>>,
+    /// What was on the vehicle before the old plan was put back, where that was not only parts of
+    /// the two.
+    pub found: Option<Vec<MissionItem>>,
 }
 
 /// Why a file is no record.
@@ -57,6 +62,9 @@ pub enum RecordError {
     /// Changed since it was written.
     #[error("its checksum is wrong: the file was damaged")]
     Checksum,
+    /// The number of a flight controller is none.
+    #[error("its vehicle is {0}")]
+    Uid(#[from] UidError),
 }
 
 const VERSION: u32 = 1;
@@ -89,7 +97,7 @@ impl Record {
         if checksum(&upload)? != sha256 {
             return Err(RecordError::Checksum);
         }
-        Ok(upload.into())
+        upload.try_into()
     }
 }
 
@@ -113,6 +121,8 @@ struct Upload {
     outcome: Outcome,
     system_id: u8,
     mav_autopilot: u8,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    uid: Option<String>,
     #[serde(with = "MissionTypeName")]
     mission_type: MissionType,
     began: u64,
@@ -121,6 +131,10 @@ struct Upload {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     before: Option<Vec<Item>>,
     intended: Vec<Item>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    read_back: Option<Vec<Item>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    found: Option<Vec<Item>>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -226,32 +240,43 @@ impl From<&Record> for Upload {
         Self {
             number: record.number,
             outcome: record.outcome,
-            system_id: record.vehicle.0,
-            mav_autopilot: record.autopilot.number(),
+            system_id: record.vehicle.system.0,
+            mav_autopilot: record.vehicle.autopilot.number(),
+            uid: record.vehicle.uid.map(|uid| uid.to_string()),
             mission_type: record.mission_type,
             began: record.began,
             original: to_items(&record.original),
             // A NaN makes equal lists unequal; they are then written twice, which is no harm.
             before: (record.before != record.original).then(|| to_items(&record.before)),
             intended: to_items(&record.intended),
+            read_back: record.read_back.as_deref().map(to_items),
+            found: record.found.as_deref().map(to_items),
         }
     }
 }
 
-impl From<Upload> for Record {
-    fn from(upload: Upload) -> Self {
+impl TryFrom<Upload> for Record {
+    type Error = RecordError;
+
+    fn try_from(upload: Upload) -> Result<Self, RecordError> {
+        let uid = upload.uid.map(|text| text.parse::<Uid>()).transpose()?;
         let original = from_items(upload.original);
-        Self {
+        Ok(Self {
             number: upload.number,
             outcome: upload.outcome,
-            vehicle: SystemId(upload.system_id),
-            autopilot: Autopilot::from(upload.mav_autopilot),
+            vehicle: VehicleId {
+                system: SystemId(upload.system_id),
+                autopilot: Autopilot::from(upload.mav_autopilot),
+                uid,
+            },
             mission_type: upload.mission_type,
             began: upload.began,
             before: upload.before.map_or_else(|| original.clone(), from_items),
             original,
             intended: from_items(upload.intended),
-        }
+            read_back: upload.read_back.map(from_items),
+            found: upload.found.map(from_items),
+        })
     }
 }
 
@@ -284,11 +309,16 @@ mod tests {
         Record {
             number: 3,
             outcome: Outcome::Started,
-            vehicle: SystemId(7),
-            autopilot: Autopilot::Px4,
+            vehicle: VehicleId {
+                system: SystemId(7),
+                autopilot: Autopilot::Px4,
+                uid: Uid::from_version(9, [0; 18]),
+            },
             mission_type: MissionType::Fence,
             began: 1_700_000_000,
             intended: original.iter().rev().copied().collect(),
+            read_back: Some(before.clone()),
+            found: (!original.is_empty()).then(|| original.clone()),
             original,
             before,
         }
@@ -313,6 +343,12 @@ mod tests {
             prop_assert_eq!(bits(&read.original), bits(&written.original));
             prop_assert_eq!(bits(&read.before), bits(&written.before));
             prop_assert_eq!(bits(&read.intended), bits(&written.intended));
+            prop_assert_eq!(read.vehicle, written.vehicle);
+            for (read, written) in
+                [(&read.read_back, &written.read_back), (&read.found, &written.found)]
+            {
+                prop_assert_eq!(read.as_deref().map(bits), written.as_deref().map(bits));
+            }
             let plain = |record: &Record| {
                 let ints = |item: &MissionItem| {
                     (item.seq, item.frame, item.command, item.current, item.autocontinue, item.e7())

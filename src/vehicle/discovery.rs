@@ -10,6 +10,7 @@ use tokio::sync::{Mutex, watch};
 use tokio::time::{Instant, timeout_at};
 
 use super::Vehicle;
+use super::identity::Uid;
 use super::state::{VehicleState, command, follow};
 use super::timing::Timing;
 use crate::link::message::Heartbeat;
@@ -203,12 +204,14 @@ pub async fn find(link: &Link, search: &Search) -> Result<Vehicle, DiscoveryErro
 
     let (send, state) = watch::channel(VehicleState::new(heartbeat, received.at));
     let monitor = tokio::spawn(follow(link.clone(), link.subscribe()?, node, send));
-    let capabilities = ask_capabilities(link, &mut inbox, node, &search.timing).await?;
+    let version = ask_version(link, &mut inbox, node, &search.timing).await?;
+    let (capabilities, uid) = version.map_or((None, None), |(it, uid)| (Some(it), uid));
     Ok(Vehicle {
         link: link.clone(),
         node,
         autopilot,
         capabilities,
+        uid,
         state,
         monitor,
         timing: search.timing.clone(),
@@ -264,12 +267,12 @@ fn autopilot_heartbeat(received: &Received) -> Option<Heartbeat> {
 
 /// Asks for AUTOPILOT_VERSION. `None` where the vehicle does not say: not an error, since some
 /// never do and the protocol itself will show.
-async fn ask_capabilities(
+async fn ask_version(
     link: &Link,
     inbox: &mut Inbox,
     vehicle: Node,
     timing: &Timing,
-) -> Result<Option<Capabilities>, LinkError> {
+) -> Result<Option<(Capabilities, Option<Uid>)>, LinkError> {
     const TRIES: u32 = 2;
     let params = [AUTOPILOT_VERSION_DATA::ID as f32, 0.0];
     for _ in 0..TRIES {
@@ -281,7 +284,8 @@ async fn ask_capabilities(
                 continue;
             }
             if let Some(version) = received.decode::<AUTOPILOT_VERSION_DATA>() {
-                return Ok(Some(Capabilities(version.capabilities.bits())));
+                let uid = Uid::from_version(version.uid, version.uid2);
+                return Ok(Some((Capabilities(version.capabilities.bits()), uid)));
             }
         }
     }

@@ -1,8 +1,9 @@
 //! The vehicle at the other end of a link: finding it, knowing its state, and moving missions,
 //! fences and rally points without ever losing one.
 //!
-//! [`discovery`] finds it, [`state`] follows it, [`parameter`] reads its parameters, [`download`],
-//! [`upload`] and [`clear`] speak the mission protocol over [`transfer`], [`ftp`] reads plans as files, [`readback`] compares what was sent with what is held,
+//! [`discovery`] finds it, [`identity`] tells it from others, [`state`] follows it, [`parameter`]
+//! reads its parameters, [`download`], [`upload`] and [`clear`] speak the mission protocol over
+//! [`transfer`], [`ftp`] reads plans as files, [`readback`] compares what was sent with what is held,
 //! [`replace`] is the safe sequence of it all, [`numbering`] turns the vehicle's lists into
 //! missions and back.
 
@@ -10,6 +11,7 @@ pub mod clear;
 pub mod discovery;
 pub mod download;
 pub mod ftp;
+pub mod identity;
 pub mod numbering;
 pub mod parameter;
 pub mod readback;
@@ -28,6 +30,7 @@ use tokio::time::timeout;
 
 pub use discovery::{Autopilot, Capabilities, DiscoveryError, Search, find};
 pub use ftp::plan::Fingerprint;
+pub use identity::{Uid, VehicleId};
 pub use parameter::{ParameterError, ParameterValue};
 pub use state::{Position, VehicleState};
 pub use timing::Timing;
@@ -41,6 +44,7 @@ pub struct Vehicle {
     node: Node,
     autopilot: Autopilot,
     capabilities: Option<Capabilities>,
+    uid: Option<Uid>,
     state: watch::Receiver<VehicleState>,
     monitor: JoinHandle<LinkError>,
     timing: Timing,
@@ -59,6 +63,12 @@ impl Vehicle {
     #[must_use]
     pub fn autopilot(&self) -> Autopilot {
         self.autopilot
+    }
+
+    /// Which vehicle it is, as far as it has told.
+    #[must_use]
+    pub fn id(&self) -> VehicleId {
+        VehicleId { system: self.node.system, autopilot: self.autopilot, uid: self.uid }
     }
 
     /// What it says it can do, where it says so.

@@ -54,6 +54,24 @@ pub fn to_vehicle(
     items
 }
 
+/// The altitude to send so that ArduPilot keeps `z`.
+///
+/// It multiplies by 100 in single precision and cuts to whole centimetres, so that an altitude it
+/// has given out itself can come back a centimetre lower (`30.11` as `f32` does not). The next
+/// number further from zero makes up for that.
+pub(super) fn for_whole_centimetres(z: f32) -> f32 {
+    let centimetres = (f64::from(z) * 100.0).round();
+    let is_kept = |z: f32| f64::from((z * 100.0).trunc()) == centimetres;
+    let is_whole =
+        (f64::from(z) * 100.0 - centimetres).abs() <= centimetres.abs() * f64::from(f32::EPSILON);
+    if !is_whole || is_kept(z) {
+        return z;
+    }
+    let further = |z: f32| if z < 0.0 { z.next_down() } else { z.next_up() };
+    let tried = [further(z), further(further(z))];
+    tried.into_iter().find(|&z| is_kept(z)).unwrap_or(z)
+}
+
 /// How many items of its own an autopilot keeps before the first command.
 fn home_slots(autopilot: Autopilot) -> i32 {
     i32::from(autopilot == Autopilot::ArduPilot)
@@ -116,5 +134,26 @@ fn int_twin(frame: Frame) -> Frame {
         Frame::GLOBAL_RELATIVE_ALT => Frame::GLOBAL_RELATIVE_ALT_INT,
         Frame::GLOBAL_TERRAIN_ALT => Frame::GLOBAL_TERRAIN_ALT_INT,
         other => other,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_altitude_that_ardupilot_gives_out_is_kept_when_it_is_sent_back() {
+        let mut nudged = 0;
+        for centimetres in -1_000_000_i32..=1_000_000 {
+            for given_out in [centimetres as f32 * 0.01, centimetres as f32 / 100.0] {
+                let sent = for_whole_centimetres(given_out);
+                assert_eq!((sent * 100.0) as i32, centimetres, "{given_out} sent as {sent}");
+                nudged += u32::from(sent != given_out);
+            }
+        }
+        assert!(nudged > 0, "there would be no need for this");
+        for not_whole in [30.123, f32::NAN, f32::INFINITY, 0.0] {
+            assert_eq!(for_whole_centimetres(not_whole).to_bits(), f32::to_bits(not_whole));
+        }
     }
 }

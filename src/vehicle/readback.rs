@@ -87,8 +87,35 @@ pub fn differences(
     sent: &[MissionItem],
     held: &[MissionItem],
 ) -> Vec<Difference> {
+    found(Plan { autopilot, mission_type, exact: false }, sent, held)
+}
+
+/// All changes between two downloads of a plan, in the order of the items. Both have been through
+/// the vehicle's storage, so nothing is excused but what is no content of a plan: `current`, and
+/// ArduPilot's home in slot 0 of a mission.
+#[must_use]
+pub fn changes(
+    autopilot: Autopilot,
+    mission_type: MissionType,
+    earlier: &[MissionItem],
+    now: &[MissionItem],
+) -> Vec<Difference> {
+    found(Plan { autopilot, mission_type, exact: true }, earlier, now)
+}
+
+/// Which plan of whom is compared, and how.
+#[derive(Clone, Copy)]
+struct Plan {
+    autopilot: Autopilot,
+    mission_type: MissionType,
+    /// Nothing is excused.
+    exact: bool,
+}
+
+fn found(plan: Plan, sent: &[MissionItem], held: &[MissionItem]) -> Vec<Difference> {
     let mut found = Vec::new();
-    let has_home_slot = autopilot == Autopilot::ArduPilot && mission_type == MissionType::Mission;
+    let has_home_slot =
+        plan.autopilot == Autopilot::ArduPilot && plan.mission_type == MissionType::Mission;
     if has_home_slot && sent.len() <= 1 && held.len() <= 1 {
         // No commands, whether home is counted or not.
         return found;
@@ -103,21 +130,20 @@ pub fn differences(
     }
     for (seq, (sent, held)) in sent.iter().zip(held).enumerate() {
         if !(has_home_slot && seq == 0) {
-            compare(autopilot, mission_type, seq, sent, held, &mut found);
+            compare(plan, seq, sent, held, &mut found);
         }
     }
     found
 }
 
 fn compare(
-    autopilot: Autopilot,
-    mission_type: MissionType,
+    plan: Plan,
     seq: usize,
     sent: &MissionItem,
     held: &MissionItem,
     found: &mut Vec<Difference>,
 ) {
-    let rules = Rules { autopilot, mission_type, command: sent.command };
+    let rules = Rules { plan, command: sent.command };
     let mut check = |same: bool, field: Field, sent: &dyn fmt::Display, held: &dyn fmt::Display| {
         if !same {
             found.push(Difference { seq, field, sent: sent.to_string(), held: held.to_string() });
@@ -143,41 +169,46 @@ fn compare(
 
 /// What counts as the same, for one item.
 struct Rules {
-    autopilot: Autopilot,
-    mission_type: MissionType,
+    plan: Plan,
     command: Command,
 }
 
 impl Rules {
     fn is_ardupilot(&self) -> bool {
-        self.autopilot == Autopilot::ArduPilot
+        self.plan.autopilot == Autopilot::ArduPilot
     }
 
     /// ArduPilot keeps no frame, position or altitude with a mission command that has no place.
     fn has_no_place(&self) -> bool {
         self.is_ardupilot()
-            && self.mission_type == MissionType::Mission
+            && self.plan.mission_type == MissionType::Mission
             && !ARDUPILOT_WITH_PLACE.contains(&self.command.0)
     }
 
     fn same_frame(&self, sent: Frame, held: Frame) -> bool {
+        if self.plan.exact {
+            return sent == held;
+        }
         let either_global = sent.is_global() && held.is_global();
         plain(sent) == plain(held)
             || self.has_no_place()
-            || (self.mission_type == MissionType::Fence && either_global)
+            || (self.plan.mission_type == MissionType::Fence && either_global)
             // ArduPilot reads frame 2 with a place as altitude above mean sea level.
             || (self.is_ardupilot() && sent == Frame::MISSION && plain(held) == Frame::GLOBAL)
     }
 
     fn same_place(&self, sent: i32, held: i32) -> bool {
-        sent == held || (self.has_no_place() && held == 0)
+        sent == held || (!self.plan.exact && self.has_no_place() && held == 0)
     }
 
     fn same_altitude(&self, sent: f32, held: f32) -> bool {
-        if same_bits_or_value(sent, held) || (self.has_no_place() && held == 0.0) {
+        if self.plan.exact || same_number(sent, held) {
+            return same_number(sent, held);
+        }
+        if self.has_no_place() && held == 0.0 {
             return true;
         }
-        match self.mission_type {
+        match self.plan.mission_type {
             MissionType::Fence => held == 0.0,
             // Cut to whole centimetres, or metres, towards zero; the rest is f32's own rounding.
             MissionType::Mission => self.is_ardupilot() && cut_to(0.01, sent, held),
@@ -186,14 +217,15 @@ impl Rules {
     }
 
     fn same_autocontinue(&self, sent: u8, held: u8) -> bool {
-        sent == held || self.is_ardupilot() || self.mission_type == MissionType::Fence
+        let excused = self.is_ardupilot() || self.plan.mission_type == MissionType::Fence;
+        sent == held || (!self.plan.exact && excused)
     }
 
     fn same_param(&self, k: usize, sent: f32, held: f32) -> bool {
-        if same_bits_or_value(sent, held) {
-            return true;
+        if self.plan.exact || same_number(sent, held) {
+            return same_number(sent, held);
         }
-        match (self.mission_type, self.autopilot) {
+        match (self.plan.mission_type, self.plan.autopilot) {
             (MissionType::Fence, _) => k > 0 && held == 0.0,
             (MissionType::Rally, _) => held == 0.0,
             (MissionType::Mission, Autopilot::ArduPilot) => {
@@ -209,7 +241,7 @@ impl Rules {
 }
 
 /// Equal as numbers (so 0 and -0 are one), or the same NaN or infinity.
-fn same_bits_or_value(a: f32, b: f32) -> bool {
+fn same_number(a: f32, b: f32) -> bool {
     a == b || (a.is_nan() && b.is_nan())
 }
 
@@ -222,10 +254,11 @@ fn plain(frame: Frame) -> Frame {
     }
 }
 
-/// Whether `held` is `sent` cut to whole `unit`s.
+/// Whether `held` is `sent` cut to whole `unit`s, towards zero.
 fn cut_to(unit: f32, sent: f32, held: f32) -> bool {
     let rounding = 4.0 * f32::EPSILON * sent.abs().max(1.0);
-    (sent - held).abs() <= unit + rounding
+    let cut_off = (sent - held) * 1.0_f32.copysign(sent);
+    held * sent >= 0.0 && (-rounding..=unit + rounding).contains(&cut_off)
 }
 
 fn same_angle(sent: f32, held: f32) -> bool {
@@ -416,6 +449,45 @@ mod tests {
             let mut held = sent.clone();
             spoil(&mut held);
             assert_eq!(fields(Autopilot::ArduPilot, &sent, &held), [field]);
+        }
+    }
+
+    #[test]
+    fn an_altitude_is_cut_towards_zero_by_less_than_a_centimetre_and_never_raised() {
+        for (sent, held, same) in [
+            (30.129, 30.12, true),
+            (30.12, 30.11, true), // 30.12 as f32, times 100, is below 3012
+            (30.12, 30.129, false),
+            (30.12, 30.10, false),
+            (-5.128, -5.12, true),
+            (-5.12, -5.13, false),
+            (0.004, 0.0, true),
+            (0.004, -0.004, false),
+        ] {
+            assert_eq!(cut_to(0.01, sent, held), same, "{sent} -> {held}");
+        }
+    }
+
+    #[test]
+    fn between_two_downloads_nothing_is_excused_but_home_and_current() {
+        let earlier = plan([waypoint(), waypoint(), waypoint()]);
+        let count = |now: &[MissionItem]| {
+            changes(Autopilot::ArduPilot, MissionType::Mission, &earlier, now).len()
+        };
+        let mut now = earlier.clone();
+        now[0].x += 5;
+        now[2].current = 1;
+        assert_eq!(count(&now), 0);
+        for spoil in [
+            (|item: &mut MissionItem| item.z -= 0.005) as fn(&mut MissionItem),
+            |item| item.params[1] = 5.0,
+            |item| item.params[3] = f32::NAN,
+            |item| item.frame = Frame::GLOBAL_RELATIVE_ALT,
+            |item| item.autocontinue = 0,
+        ] {
+            let mut now = earlier.clone();
+            spoil(&mut now[1]);
+            assert_eq!(count(&now), 1);
         }
     }
 

@@ -69,6 +69,31 @@ impl Default for Timing {
 }
 
 impl Timing {
+    /// For a vehicle whose clock runs `factor` times as fast, as a simulator's can: its heartbeats
+    /// come that much faster, and it gives up that much earlier.
+    #[must_use]
+    pub fn faster(self, factor: f64) -> Self {
+        let scaled = |duration: Duration| duration.div_f64(factor);
+        Self {
+            request: scaled(self.request),
+            item_min: scaled(self.item_min),
+            item_max: scaled(self.item_max),
+            round_trips: self.round_trips,
+            parameter: scaled(self.parameter),
+            ftp: scaled(self.ftp),
+            retries: self.retries,
+            patience: scaled(self.patience),
+            restarts: self.restarts,
+            busy: scaled(self.busy),
+            busy_pause: scaled(self.busy_pause),
+            explanation: scaled(self.explanation),
+            explanation_age: scaled(self.explanation_age),
+            fence_settles: scaled(self.fence_settles),
+            stragglers: scaled(self.stragglers),
+            silence: scaled(self.silence),
+        }
+    }
+
     /// A pause before asking a busy vehicle again, not the same for two clients that collided.
     pub(super) fn busy_pause(&self) -> Duration {
         let fraction = f64::from(random_u16()) / f64::from(u16::MAX);

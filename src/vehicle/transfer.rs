@@ -141,6 +141,32 @@ pub enum TransferError {
         /// How often.
         times: u32,
     },
+    /// The vehicle has not room enough.
+    #[error(
+        "the {mission_type} has {count} items, and the vehicle has room for {}{}; plan with fewer \
+         waypoints (--max-waypoints N)",
+        most.map_or_else(|| "fewer".to_owned(), |most| most.to_string()),
+        if texts.is_empty() { String::new() } else { format!(" (it says: {})", texts.join("; ")) }
+    )]
+    NoSpace {
+        /// Which plan.
+        mission_type: MissionType,
+        /// What was to be uploaded.
+        count: usize,
+        /// What the vehicle holds at most, where it says so.
+        most: Option<usize>,
+        /// What it said in words around that moment.
+        texts: Vec<String>,
+    },
+    /// quavd broke an upload off.
+    #[error(
+        "the upload of the {mission_type} was called off: the vehicle was armed meanwhile, or went \
+         on to another item of its mission"
+    )]
+    CalledOff {
+        /// Which plan.
+        mission_type: MissionType,
+    },
     /// The plan cannot be that long.
     #[error("the vehicle announces {count} items of the {mission_type}, more than {MOST_ITEMS}")]
     TooManyAnnounced {

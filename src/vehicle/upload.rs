@@ -3,16 +3,19 @@
 //! An acknowledged upload is not yet a proven one: the caller downloads and compares. That is
 //! also what settles an upload whose last acknowledgement was lost.
 
+use std::time::Duration;
+
 use tokio::time::Instant;
 
-use super::Vehicle;
 use super::discovery::Autopilot;
+use super::numbering::for_whole_centimetres;
 use super::timing::Patience;
 use super::transfer::{
     Awaited, BusyWait, Direction, Exchange, Heard, MOST_ITEMS, MissionResult, OnProgress, Progress,
     Refusal, Setback, TransferError,
 };
-use crate::link::message::{MissionCount, MissionItemInt};
+use super::{Vehicle, VehicleState};
+use crate::link::message::{MissionAck, MissionCount, MissionItemInt};
 use crate::mission::{MissionItem, MissionType};
 
 /// How an upload ended.
@@ -38,26 +41,10 @@ impl Vehicle {
         items: &[MissionItem],
         on_progress: OnProgress<'_>,
     ) -> Result<Uploaded, TransferError> {
-        let count = u16::try_from(items.len()).ok().filter(|&count| count <= MOST_ITEMS);
-        let count =
-            count.ok_or(TransferError::TooManyToSend { mission_type, count: items.len() })?;
-        let _one_at_a_time = self.transfer.lock().await;
         let mut restarts = 0;
         loop {
-            let mut exchange = Exchange::new(self, mission_type)?;
-            let mut upload = Upload {
-                exchange: &mut exchange,
-                items,
-                count,
-                last_sent: None,
-                tries: 0,
-                is_unasked: false,
-            };
-            match upload.attempt(on_progress).await {
-                Ok(uploaded) => {
-                    tracing::debug!(plan = %mission_type, items = count, ?uploaded, "uploaded");
-                    return Ok(uploaded);
-                }
+            match self.attempt(mission_type, items, &|_| true, BusyHabit::Wait, on_progress).await {
+                Ok(uploaded) => return Ok(uploaded),
                 Err(Setback::Again(error))
                     if restarts < self.timing.restarts && self.is_alive() =>
                 {
@@ -70,12 +57,64 @@ impl Vehicle {
             }
         }
     }
+
+    /// One attempt at an upload, called off when `goes_on` says no to the state in which the next
+    /// item would be sent. What to do about [`Setback::Again`] is the caller's: by the time of the
+    /// next attempt, somebody else may have uploaded another plan.
+    pub(super) async fn attempt(
+        &self,
+        mission_type: MissionType,
+        items: &[MissionItem],
+        goes_on: GoesOn<'_>,
+        busy_habit: BusyHabit,
+        on_progress: OnProgress<'_>,
+    ) -> Result<Uploaded, Setback> {
+        let count = u16::try_from(items.len()).ok().filter(|&count| count <= MOST_ITEMS);
+        let count =
+            count.ok_or(TransferError::TooManyToSend { mission_type, count: items.len() })?;
+        let _one_at_a_time = self.transfer.lock().await;
+        let mut exchange = Exchange::new(self, mission_type)?;
+        let mut upload = Upload {
+            exchange: &mut exchange,
+            items,
+            goes_on,
+            busy_habit,
+            ends_told: 0,
+            count,
+            last_sent: None,
+            tries: 0,
+            is_unasked: false,
+        };
+        let uploaded = upload.attempt(on_progress).await?;
+        tracing::debug!(plan = %mission_type, items = count, ?uploaded, "uploaded");
+        Ok(uploaded)
+    }
 }
+
+/// How often the end of a download is told again to a busy PX4.
+const ENDS: u32 = 4;
+
+/// What to do when the vehicle is busy with somebody else's upload.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum BusyHabit {
+    /// Wait and offer again.
+    Wait,
+    /// End the attempt with [`TransferError::Busy`]: the plan that is there afterwards will be
+    /// another one.
+    End,
+}
+
+/// Decides, from the vehicle's state, whether an upload goes on.
+pub(super) type GoesOn<'a> = &'a (dyn Fn(&VehicleState) -> bool + Sync);
 
 /// One attempt: offers the count, then hands out what is asked for.
 struct Upload<'a, 'v> {
     exchange: &'a mut Exchange<'v>,
     items: &'a [MissionItem],
+    goes_on: GoesOn<'a>,
+    busy_habit: BusyHabit,
+    /// How often the end of the last download was told again.
+    ends_told: u32,
     count: u16,
     /// The furthest item that the vehicle asked for and was sent.
     last_sent: Option<u16>,
@@ -83,6 +122,11 @@ struct Upload<'a, 'v> {
     tries: u32,
     /// Whether it was last sent because the line was quiet, not because it was asked for.
     is_unasked: bool,
+}
+
+/// The number in ArduPilot's "Only 650 items are supported".
+fn capacity_in(text: &str) -> Option<usize> {
+    text.strip_prefix("Only ")?.strip_suffix(" items are supported")?.parse().ok()
 }
 
 /// What follows an acknowledgement.
@@ -166,8 +210,17 @@ impl Upload<'_, '_> {
 
     async fn send_item(&mut self, seq: u16) -> Result<(), TransferError> {
         let Some(&item) = self.items.get(usize::from(seq)) else { return Ok(()) };
+        if !(self.goes_on)(&self.exchange.vehicle.state()) {
+            self.acknowledge(MissionResult::OPERATION_CANCELLED).await?;
+            return Err(TransferError::CalledOff { mission_type: self.exchange.mission_type });
+        }
         let message = MissionItemInt {
-            item: MissionItem { seq, ..item },
+            item: MissionItem {
+                seq,
+                z: self.altitude_of(&item),
+                current: self.mark_of(&item),
+                ..item
+            },
             target: self.exchange.target(),
             mission_type: self.exchange.wire_type(),
         };
@@ -179,6 +232,33 @@ impl Upload<'_, '_> {
             self.tries += 1;
         }
         Ok(())
+    }
+
+    async fn acknowledge(&self, result: MissionResult) -> Result<(), TransferError> {
+        let ack = MissionAck {
+            target: self.exchange.target(),
+            result: result.0,
+            mission_type: self.exchange.wire_type(),
+            opaque_id: 0,
+        };
+        self.exchange.send(&ack).await
+    }
+
+    /// Whether an item is marked as the current one. ArduPilot takes other marks than 0 for orders
+    /// to fly at once, whatever they stood for in what was downloaded.
+    fn mark_of(&self, item: &MissionItem) -> u8 {
+        match self.exchange.vehicle.autopilot {
+            Autopilot::ArduPilot => 0,
+            Autopilot::Px4 | Autopilot::Other(_) => u8::from(item.current == 1),
+        }
+    }
+
+    /// The altitude to send for an item.
+    fn altitude_of(&self, item: &MissionItem) -> f32 {
+        match (self.exchange.vehicle.autopilot, self.exchange.mission_type) {
+            (Autopilot::ArduPilot, MissionType::Mission) => for_whole_centimetres(item.z),
+            _ => item.z,
+        }
     }
 
     /// Nothing came: either our message or the answer was lost. Sends again what was sent last,
@@ -216,6 +296,17 @@ impl Upload<'_, '_> {
             MissionResult::OPERATION_CANCELLED if self.last_sent.is_none() => Ok(Next::Wait),
             MissionResult::DENIED if self.last_sent.is_some() => Ok(Next::Wait),
             result if self.last_sent.is_none() && self.means_busy(result) => {
+                // PX4 is busy with our own last download where the end of that was lost.
+                if self.exchange.vehicle.autopilot == Autopilot::Px4 && self.ends_told < ENDS {
+                    self.ends_told += 1;
+                    self.acknowledge(MissionResult::ACCEPTED).await?;
+                    return Ok(Next::Offer);
+                }
+                if self.busy_habit == BusyHabit::End {
+                    let mission_type = self.exchange.mission_type;
+                    let busy = TransferError::Busy { mission_type, waited: Duration::ZERO };
+                    return Err(Setback::Again(busy));
+                }
                 busy.pause(self.exchange).await?;
                 Ok(Next::Offer)
             }
@@ -238,8 +329,16 @@ impl Upload<'_, '_> {
             // It knows of no upload any more: it has restarted, or given up.
             MissionResult::ERROR if self.is_unasked => Err(Setback::Again(error)),
             MissionResult::OPERATION_CANCELLED => Err(Setback::Again(error)),
+            MissionResult::NO_SPACE => Err(Setback::Final(self.no_space(error))),
             _ => Err(Setback::Final(error)),
         }
+    }
+
+    /// "No space" with its numbers.
+    fn no_space(&self, error: TransferError) -> TransferError {
+        let TransferError::Refused { mission_type, texts, .. } = error else { return error };
+        let most = texts.iter().find_map(|text| capacity_in(text));
+        TransferError::NoSpace { mission_type, count: self.items.len(), most, texts }
     }
 
     /// Whether a refusal of the count only says "not now". PX4 has no better word than ERROR.

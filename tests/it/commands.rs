@@ -226,3 +226,85 @@ fn every_example_plans_or_says_why_not() {
     }
     assert!(plans >= 11);
 }
+
+/// s5's vehicle in the air over its home, at its takeoff.
+fn in_the_air(persona: &str, mode: &str) -> (Field, Value) {
+    let mut field = Field::new("udpin:127.0.0.1:0", persona, "s5");
+    let first = if persona == "ardupilot" { 1 } else { 0 };
+    let dump = field.vehicle.dump();
+    let item = &dump["mission"]["items"][first];
+    let degrees = |axis: &str| item[axis].as_f64().unwrap() / 1e7;
+    let above = json!([degrees("x"), degrees("y"), dump["home"]["alt"].as_f64().unwrap() + 30.0]);
+    field.vehicle.control(&json!({
+        "cmd": "set", "armed": true, "mode": mode, "current": first, "position": above
+    }));
+    (field, dump["mission"].clone())
+}
+
+#[test]
+fn in_flight_the_rest_of_the_mission_is_planned_and_the_vehicle_flies_on() {
+    for (persona, mode) in [("px4", "MISSION"), ("ardupilot", "LOITER")] {
+        let (mut field, _) = in_the_air(persona, mode);
+        let current = field.vehicle.dump()["current_seq"].clone();
+        let output = field.once(&["--json", "--in-flight"]);
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{persona}: {errors}");
+        assert_eq!(stdout_json(&output)["vehicle"]["uploaded"], true);
+        assert_eq!(field.vehicle.judged()["collisions"], 0, "{persona}");
+        assert_eq!(field.vehicle.dump()["current_seq"], current, "{persona}");
+    }
+}
+
+#[test]
+fn in_flight_ardupilot_is_refused_with_5_while_it_flies_its_mission() {
+    let (mut field, before) = in_the_air("ardupilot", "AUTO");
+    let output = field.once(&["--in-flight"]);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(5), "{errors}");
+    assert!(errors.contains("flies its mission"), "{errors}");
+    assert_eq!(field.vehicle.dump()["mission"], before);
+}
+
+#[test]
+fn in_flight_a_way_to_the_current_item_that_is_not_clear_is_refused_with_3() {
+    let (mut field, _) = in_the_air("px4", "MISSION");
+    // As if it had already been at the first item: the way to the second leads through a fence.
+    field.vehicle.control(&json!({"cmd": "set", "current": 1}));
+    let before = field.vehicle.dump()["mission"].clone();
+    let output = field.once(&["--in-flight"]);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(3), "{errors}");
+    assert!(errors.contains("from where the vehicle is"), "{errors}");
+    assert_eq!(field.vehicle.dump()["mission"]["items"], before["items"]);
+}
+
+#[test]
+fn a_vehicle_with_little_room_is_refused_with_5_or_gets_fewer_waypoints() {
+    let mut field = Field::new("udpin:127.0.0.1:0", "px4", "s1");
+    let before = field.vehicle.dump();
+    let full = stdout_json(&field.once(&["--json", "--dry-run"]));
+    let waypoints = full["waypoints"].as_array().unwrap().len();
+    let output = field.once(&["--max-items", "2"]);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(5), "{errors}");
+    assert!(errors.contains("more than the 2 of --max-items"), "{errors}");
+    assert_eq!(field.vehicle.dump()["mission"], before["mission"]);
+    assert_eq!(field.vehicle.dump()["uploads"].as_array().unwrap().len(), 0);
+
+    let inserted = before["mission"]["count"].as_u64().unwrap() as usize;
+    let inserted = waypoints - inserted.min(waypoints);
+    let fewer = (inserted - 1).to_string();
+    let output = field.once(&["--json", "--max-waypoints", &fewer]);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    match output.status.code() {
+        Some(0) => {
+            let said = stdout_json(&output);
+            assert!(said["warnings"].to_string().contains("corners were merged"), "{said}");
+            assert_eq!(field.vehicle.judged()["collisions"], 0);
+        }
+        Some(3) => assert!(errors.contains("inserted waypoints was found"), "{errors}"),
+        code => panic!("{code:?}: {errors}"),
+    }
+    let output = field.once(&["--max-waypoints", "0"]);
+    assert_eq!(output.status.code(), Some(3), "{}", String::from_utf8_lossy(&output.stderr));
+}

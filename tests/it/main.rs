@@ -12,6 +12,7 @@ mod deadline;
 mod docs;
 mod fuzz;
 mod ibm_circuits;
+mod in_flight;
 mod loaders;
 mod packaging;
 mod page;

@@ -1,7 +1,6 @@
 //! A plan is replaced as a whole or not at all, and quavd knows which, whatever happens on the
 //! way.
 
-use quav::link::SystemId;
 use quav::mission::{MissionItem, MissionType};
 use quav::store::{Outcome, Store};
 use quav::vehicle::replace::{
@@ -27,7 +26,11 @@ struct Scene {
 
 impl Scene {
     async fn new(persona: &str) -> Self {
-        let mut fake = FakeVehicle::start(&["--persona", persona]);
+        Self::scripted(persona, &[]).await
+    }
+
+    async fn scripted(persona: &str, more: &[&str]) -> Self {
+        let mut fake = FakeVehicle::start(&[&["--persona", persona], more].concat());
         fake.set(MISSION, &(0..12).map(waypoint).collect::<Vec<_>>());
         let session = Session::open(&fake.endpoint(), quick()).await;
         let before = download(&session.vehicle).await;
@@ -124,7 +127,7 @@ async fn a_refusal_in_the_middle_ends_with_the_old_plan_back() {
         let settled = if persona == "px4" { Settled::Untouched } else { Settled::PutBack };
         assert!(matches!(error.aftermath, Aftermath::Settled(s) if s == settled), "{error}");
         assert!(scene.is_as_before());
-        assert_eq!(store.open_record(SystemId(1), MISSION).unwrap(), None);
+        assert_eq!(store.open_record(&scene.vehicle().id(), MISSION).unwrap(), None);
         scene.session.close().await;
     }
 }
@@ -152,7 +155,7 @@ async fn a_link_lost_in_mid_upload_is_said_and_the_next_start_puts_the_old_plan_
         let error = scene.replace(&store).await.unwrap_err();
         assert_eq!(error.failure(), Failure::Unreachable, "{error}");
         assert!(matches!(error.aftermath, Aftermath::Unsettled { .. }), "{error}");
-        let open = store.open_record(SystemId(1), MISSION).unwrap().unwrap();
+        let open = store.open_record(&scene.vehicle().id(), MISSION).unwrap().unwrap();
         assert_eq!(open.before, scene.before);
         drop(store);
 
@@ -213,5 +216,101 @@ async fn an_armed_vehicle_is_not_written_to() {
     assert!(matches!(error.obstacle, Obstacle::Armed), "{error}");
     assert_eq!(error.failure(), Failure::Refused);
     assert!(scene.is_as_before());
+    scene.session.close().await;
+}
+
+#[tokio::test]
+async fn what_another_ground_station_uploads_while_quavd_begins_is_not_overwritten() {
+    // It comes between the last look at the plan and the upload, which is then denied.
+    let theirs: Vec<_> = (100..103).map(waypoint).collect();
+    let items: Vec<_> = theirs.iter().map(crate::sitl::item_json).collect();
+    let script = json!({
+        "on": "download_done", "nth": 2, "cmd": "gcs-upload", "items": items, "pace": 0.05
+    });
+    for persona in PERSONAS {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("script");
+        std::fs::write(&path, script.to_string()).unwrap();
+        let mut scene = Scene::scripted(persona, &["--script", path.to_str().unwrap()]).await;
+        let store = scene.store();
+        let error = scene.replace(&store).await.unwrap_err();
+        assert!(matches!(error.obstacle, Obstacle::Changed { .. }), "{persona}: {error}");
+        assert!(
+            matches!(error.aftermath, Aftermath::Settled(Settled::LeftAlone)),
+            "{persona}: {error}"
+        );
+        let held = scene.fake.held(MISSION);
+        let last = |items: &[Value]| items.last().map(|item| item["x"].clone());
+        assert_eq!(last(&held), last(&items), "{persona}");
+        assert_eq!(held.len(), 3, "{persona}");
+        let record = store.last(&scene.vehicle().id(), MISSION).unwrap().unwrap();
+        assert_eq!(record.outcome, Outcome::Superseded);
+        scene.session.close().await;
+    }
+}
+
+#[tokio::test]
+async fn an_item_that_storage_falsified_is_noticed_kept_on_disk_and_put_right() {
+    for persona in PERSONAS {
+        for (field, value) in [("x", "473977421"), ("z", "30.5"), ("frame", "0"), ("command", "19")]
+        {
+            let mut scene = Scene::new(persona).await;
+            let store = scene.store();
+            scene.fake.fault(&format!("mis-store:item=9,field={field},value={value},times=1"));
+            let error = scene.replace(&store).await.unwrap_err();
+            assert!(matches!(error.obstacle, Obstacle::Mismatch { .. }), "{field}: {error}");
+            assert!(matches!(error.aftermath, Aftermath::Settled(Settled::PutBack)), "{error}");
+            assert!(scene.is_as_before(), "{persona} {field}");
+            let record = store.last(&scene.vehicle().id(), MISSION).unwrap().unwrap();
+            let found = record.found.expect("what was overwritten is kept");
+            assert_eq!(found.len(), scene.replacement().intended.len());
+            scene.session.close().await;
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_record_of_another_flight_controller_with_the_same_system_id_is_not_applied() {
+    let mut scene = Scene::new("ardupilot").await;
+    let store = scene.store();
+    scene.fake.fault("vanish:item=6,when=upload");
+    scene.replace(&store).await.unwrap_err();
+    // Another vehicle, by chance with the same half of a mission on it.
+    let left = scene.fake.held(MISSION).split_off(1);
+    scene.fake = FakeVehicle::start(&["--persona", "ardupilot", "--uid", "77"]);
+    scene.fake.control(&json!({"cmd": "set", "mission": left}));
+    let dumped = scene.fake.held(MISSION);
+    scene.again().await;
+    let settled = settle(scene.vehicle(), &store, MISSION, WhileArmed::Refuse, &mut |_| {}).await;
+    assert_eq!(settled.unwrap(), None);
+    assert_eq!(scene.fake.held(MISSION), dumped);
+    scene.session.close().await;
+}
+
+#[tokio::test]
+async fn too_many_items_are_refused_with_the_numbers_and_nothing_is_written() {
+    let mut scene = Scene::scripted("ardupilot", &["--capacity", "mission=14"]).await;
+    let store = scene.store();
+    let error = scene.replace(&store).await.unwrap_err();
+    let Obstacle::Transfer(TransferError::NoSpace { count, most, .. }) = &error.obstacle else {
+        panic!("{error}");
+    };
+    assert_eq!((*count, *most), (17, Some(14)));
+    assert_eq!(error.failure(), Failure::Refused);
+    assert!(matches!(error.aftermath, Aftermath::Settled(Settled::Untouched)), "{error}");
+    assert!(scene.is_as_before());
+    scene.session.close().await;
+}
+
+#[tokio::test]
+async fn nothing_is_sent_where_the_old_plan_cannot_be_saved() {
+    let mut scene = Scene::new("ardupilot").await;
+    let store = scene.store();
+    std::fs::remove_dir_all(scene.directory.path()).unwrap();
+    let error = scene.replace(&store).await.unwrap_err();
+    assert!(matches!(error.obstacle, Obstacle::Store(_)), "{error}");
+    assert_eq!(error.failure(), Failure::Local);
+    assert!(scene.is_as_before());
+    assert_eq!(scene.fake.dump()["events"]["counts"]["upload_start"], Value::Null);
     scene.session.close().await;
 }

@@ -16,6 +16,10 @@ use tokio_util::sync::CancellationToken;
 /// Both autopilots that the fake vehicle can be.
 pub(crate) const PERSONAS: [&str; 2] = ["ardupilot", "px4"];
 
+/// An event that a fake vehicle is asked to tell.
+#[must_use]
+pub(crate) struct Waiting(());
+
 /// A running fake vehicle. Ends with this value.
 pub(crate) struct FakeVehicle {
     process: Child,
@@ -78,6 +82,29 @@ impl FakeVehicle {
         let answer: Value = serde_json::from_str(&line).unwrap();
         assert_eq!(answer["ok"], true, "{command}: {answer}");
         answer
+    }
+
+    /// Says what to wait for; the answer is for [`FakeVehicle::has_happened`], and no other command
+    /// may come between.
+    pub(crate) fn begin_to_wait(
+        &mut self,
+        event: &str,
+        fields: &Value,
+        nth: u64,
+        seconds: f64,
+    ) -> Waiting {
+        let command =
+            json!({"cmd": "wait", "on": event, "where": fields, "nth": nth, "for": seconds});
+        writeln!(self.control.get_mut(), "{command}").unwrap();
+        Waiting(())
+    }
+
+    /// Waits until it has happened; `false` where it did not in its time.
+    pub(crate) fn has_happened(&mut self, _waiting: Waiting) -> bool {
+        let mut line = String::new();
+        self.control.read_line(&mut line).unwrap();
+        let answer: Value = serde_json::from_str(&line).unwrap();
+        answer["ok"] == true
     }
 
     /// Adds a fault, such as `drop:p=0.2`.
@@ -201,7 +228,7 @@ pub(crate) fn place(item: &Value) -> LatLonE7 {
     LatLonE7 { lat: read("x"), lon: read("y") }
 }
 
-fn item_json(item: &MissionItem) -> Value {
+pub(crate) fn item_json(item: &MissionItem) -> Value {
     let number = |value: f32| if value.is_nan() { Value::Null } else { json!(value) };
     json!({
         "seq": item.seq, "frame": item.frame.0, "command": item.command.0,
