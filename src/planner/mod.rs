@@ -11,6 +11,7 @@
 //! - [`stations`]: segmentation into one edge a qubit;
 //! - [`trellis`]: two polylines as an Ising chain;
 //! - [`moves`]: challengers for refinement;
+//! - [`pair`]: two polylines as problems, in windows where need be;
 //! - [`rounds`]: QAOA decides, round after round;
 //! - [`qpu_rounds`]: the same on a QPU, many to a job;
 //! - [`finish`]: few waypoints, on the integers that the vehicle flies;
@@ -28,6 +29,7 @@ pub mod homotopy;
 pub mod leg;
 pub mod leg_space;
 pub mod moves;
+pub mod pair;
 pub mod polyline;
 pub mod qpu_rounds;
 pub mod rounds;

@@ -10,8 +10,9 @@ use std::collections::VecDeque;
 
 use super::candidates::Candidate;
 use super::moves::moves;
+use super::pair::Pair;
 use super::rounds::{
-    Challenger, Contest, Contested, PROGRESS, PROPOSALS, Pair, QpuRound, Round, RoundError,
+    Challenger, Contest, Contested, PROGRESS, PROPOSALS, QpuRound, Round, RoundError,
 };
 use super::settings::QpuTraining;
 use crate::geodesy::Xy;

@@ -4,14 +4,13 @@
 //! distinct bitstring, and keeps the cheapest clean path. The incumbent (the all-zeros string) is
 //! always judged too, so a round never makes the path worse.
 
-use std::ops::Range;
-
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::candidates::{Candidate, Source};
 use super::homotopy::passes_differently;
 use super::moves::moves;
+use super::pair::{Pair, Window};
 use super::polyline::{length, simplified};
 use super::settings::{Rounds, Settings};
 use super::stations::{Spare, aligned};
@@ -19,8 +18,8 @@ use super::trellis::{EdgeJudge, Trellis};
 use crate::geodesy::Xy;
 use crate::qaoa::qpu::QpuError;
 use crate::qaoa::{
-    Angles, AnglesSource, Bits, ChainIsing, EngineChoice, EngineError, EngineKind, Ising,
-    Objective, Qaoa, QaoaRun, RunSettings, Scale, Settled, TrainSettings,
+    Angles, AnglesSource, Bits, EngineChoice, EngineError, EngineKind, Objective, Qaoa, QaoaRun,
+    RunSettings, Scale, Settled, TrainSettings,
 };
 use crate::stop::{Stop, Stopped};
 
@@ -32,15 +31,6 @@ pub enum Challenger {
     Route,
     /// The incumbent with its stations moved.
     Refinement,
-}
-
-/// A part of a chain. The qubits outside keep the bits that they have.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-pub struct Window {
-    /// Its first qubit, from 0.
-    pub first: usize,
-    /// Qubits of the whole chain.
-    pub of: usize,
 }
 
 /// The record of one round. Energies are metres; a collision counts `penalty` in them.
@@ -104,38 +94,6 @@ pub struct QpuRound {
     pub loss_errors: Vec<f64>,
 }
 
-/// Two polylines as a problem, or a window of it.
-pub(super) struct Pair {
-    pub(super) kind: Challenger,
-    trellis: Trellis,
-    penalty: f64,
-    /// All of the trellis.
-    chain: ChainIsing,
-    window: Range<usize>,
-    /// The bits of the whole chain, of which those outside the window stay.
-    held: Bits,
-    /// The problem of the window.
-    pub(super) ising: Ising,
-}
-
-impl Pair {
-    /// The same window with other bits outside.
-    fn holding(self, held: Bits) -> Self {
-        let ising = match self.chain.window(self.window.clone(), &held) {
-            Some(problem) => problem.into(),
-            None => self.ising,
-        };
-        Self { held, ising, ..self }
-    }
-
-    /// The bits of the whole chain with those of a window's sample.
-    fn whole(&self, sample: &Bits) -> Bits {
-        let mut whole = self.held.clone();
-        sample.iter().zip(self.window.clone()).for_each(|(bit, qubit)| whole.set(qubit, bit));
-        whole
-    }
-}
-
 /// The better of staying and the cheapest sample of a round.
 pub(super) struct Decided {
     pub(super) cost: f64,
@@ -190,17 +148,6 @@ const CARRIED_STEPS: usize = 24;
 
 /// When such a training has settled.
 const CARRIED_SETTLED: Option<Settled> = Some(Settled { window: 4, tolerance: 3e-3 });
-
-/// Steps between two windows, as a share of their width: they overlap by half.
-const WINDOWS_OVERLAP: usize = 2;
-
-/// Windows of at most `most` qubits over a chain, from its start to its end.
-fn windows(qubits: usize, most: usize) -> Vec<Range<usize>> {
-    let width = most.clamp(1, qubits.max(1));
-    let step = (width / WINDOWS_OVERLAP).max(1);
-    let last = qubits - width.min(qubits);
-    (0..last).step_by(step).chain([last]).map(|first| first..first + width).collect()
-}
 
 /// The incumbent with all that the rounds share.
 pub struct Contest<'a> {
@@ -416,18 +363,7 @@ impl<'a> Contest<'a> {
         let penalty = trellis.penalty();
         let chain = trellis.ising(penalty)?;
         let most = self.settings.engine.most_qubits(self.settings.qubits);
-        let windows = windows(trellis.qubits(), most);
-        let only = windows.len() == 1;
-        let held = Bits::zeros(trellis.qubits());
-        Ok(windows
-            .into_iter()
-            .filter(|window| only || !trellis.is_idle(window.clone()))
-            .filter_map(|window| {
-                let ising = chain.window(window.clone(), &held)?.into();
-                let (trellis, chain, held) = (trellis.clone(), chain.clone(), held.clone());
-                Some(Pair { kind, trellis, penalty, chain, window, held, ising })
-            })
-            .collect())
+        Ok(Pair::windows_of(kind, trellis, penalty, chain, most))
     }
 
     /// Judges every sample of a run; the cheapest path is the incumbent if it is cheaper than staying
@@ -463,12 +399,11 @@ impl<'a> Contest<'a> {
             Some(c) => (c.exact_optimum, c.gap.unwrap_or(f64::INFINITY), c.p_optimum),
             None => (f64::NAN, f64::NAN, f64::NAN),
         };
-        let part = pair.window.len() < trellis.qubits();
         let round = Round {
             challenger: pair.kind,
             engine: run.engine,
             qubits: run.qubits,
-            window: part.then_some(Window { first: pair.window.start, of: trellis.qubits() }),
+            window: pair.part(),
             layers: run.angles.layers(),
             objective: run.objective,
             loss_is_sampled: run.loss_is_sampled,
@@ -520,20 +455,5 @@ impl<'a> Contest<'a> {
             shots: settings.shots,
             seed: self.rng.random(),
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::windows;
-
-    #[test]
-    fn windows_cover_the_chain_and_overlap() {
-        for most in [20, usize::MAX] {
-            assert_eq!(windows(20, most), vec![0..20; 1]);
-        }
-        assert_eq!(windows(21, 20), [0..20, 1..21]);
-        assert_eq!(windows(33, 8), [0..8, 4..12, 8..16, 12..20, 16..24, 20..28, 24..32, 25..33]);
-        assert_eq!(windows(3, 1), [0..1, 1..2, 2..3]);
     }
 }

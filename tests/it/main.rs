@@ -26,3 +26,4 @@ mod security;
 mod sitl;
 mod terminal;
 mod transfers;
+mod windows;
