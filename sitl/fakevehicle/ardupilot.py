@@ -28,12 +28,16 @@ class ArduPilotMissionServer(MissionServer):
 
     # ---- loading from files
 
+    def over_the_link(self, mission_type, items):
+        """A file's items as a ground station sends them: a mission behind the home slot."""
+        if mission_type != MISSION:
+            return items
+        return [home_item(self.vehicle.home), *_behind_home(items)]
+
     def load(self, mission_type, items):
         """Puts a file's items into storage; raises Refused (with .index) as an upload would."""
         stored = []
-        for index, item in enumerate(items):
-            if mission_type == MISSION and item.command == mavlink.MAV_CMD_DO_JUMP:
-                item = _jump_moved(item, 1)
+        for index, item in enumerate(_behind_home(items) if mission_type == MISSION else items):
             try:
                 stored.append(store(mission_type, item))
             except Refused as refusal:
@@ -254,6 +258,11 @@ class ArduPilotMissionServer(MissionServer):
             self.ack(channel, peer, mavlink.MAV_MISSION_DENIED, mission_type)
             return True
         return False
+
+
+def _behind_home(items):
+    """A file's mission items, DO_JUMP targets counted from the home slot."""
+    return [_jump_moved(item, 1) if item.command == mavlink.MAV_CMD_DO_JUMP else item for item in items]
 
 
 def _jump_moved(item, offset):

@@ -33,8 +33,8 @@ COMMAND_HELP = """control commands (--control, --script), one JSON object per li
   {"cmd": "reset", "seed": 7}            as just started, with empty plans and this seed; links stay open
   {"cmd": "gcs-upload", "type": "mission", "items": X, "pace": 0.05, "stop": 3}
                                          another ground station (255/190) uploads X over the protocol, one item
-                                         per pace seconds, giving up silently after `stop` items if given; X as
-                                         it goes over the link (for an ArduPilot item 0 is the home slot)
+                                         per pace seconds, giving up silently after `stop` items if given; a list
+                                         X as it goes over the link (for an ArduPilot item 0 is the home slot)
   {"cmd": "inject", "hex": "fd09..."}    puts these bytes on every link, as somebody else on the line would
   {"cmd": "statustext", "text": "hello", "severity": 6}
   {"cmd": "quit"}
@@ -133,8 +133,10 @@ class Controller:
 
     def _gcs_upload(self, command):
         mission_type = TYPE_NUMBERS[command.get("type", "mission")]
-        GroundStation(self.vehicle).upload(mission_type, _items(command["items"], mission_type),
-                                           float(command.get("pace", 0.05)), command.get("stop"))
+        items = _items(command["items"], mission_type)
+        if isinstance(command["items"], str):
+            items = self.vehicle.mission_server(None).over_the_link(mission_type, items)
+        GroundStation(self.vehicle).upload(mission_type, items, float(command.get("pace", 0.05)), command.get("stop"))
 
     def _statustext(self, command):
         self.vehicle.statustext(int(command.get("severity", 6)), str(command["text"]))

@@ -185,13 +185,12 @@ fn a_mission_is_planned_when_the_vehicle_is_found_and_when_it_changes() {
             serde_json::from_slice(&std::fs::read(last.report.unwrap()).unwrap()).unwrap();
         assert_eq!(kept["plan"]["collision_free"], true);
 
-        // Somebody uploads another mission over the protocol, with other fences beforehand.
-        let other = example("s2");
-        vehicle.control(&json!({"cmd": "set", "fence": other}));
+        // The pilot uploads the mission as drawn once more, over the protocol.
+        let drawn = example("s1");
         vehicle.control(
-            &json!({"cmd": "gcs-upload", "type": "mission", "items": other, "pace": 0.02}),
+            &json!({"cmd": "gcs-upload", "type": "mission", "items": drawn, "pace": 0.02}),
         );
-        let status = daemon.wait_for("an upload of s2", |status| status.counts.uploads >= 2);
+        let status = daemon.wait_for("a second upload", |status| status.counts.uploads >= 2);
         assert_eq!(verdict(&status), "uploaded");
         let report = vehicle.judged();
         assert_eq!(report["collisions"], 0, "{report}");
