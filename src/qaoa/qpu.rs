@@ -207,16 +207,7 @@ pub fn run_of(
     exact_optimum: Option<f64>,
     measured: Measured,
 ) -> QaoaRun {
-    let best = measured
-        .samples
-        .iter()
-        .map(|sample| (ising.energy(&sample.bits), sample))
-        .min_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(energy, Sample { bits, count })| BestSample {
-            bits: bits.clone(),
-            energy,
-            count: *count,
-        });
+    let best = BestSample::of(&measured.samples, ising);
     let certificate = exact_optimum.map(|exact_optimum| {
         let close = 1e-9 * exact_optimum.abs().max(1.0);
         let optimal =

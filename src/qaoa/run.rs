@@ -67,6 +67,21 @@ pub struct BestSample {
     pub count: u32,
 }
 
+impl BestSample {
+    /// The one of lowest energy; `None` where there are no samples.
+    pub(super) fn of(samples: &[Sample], ising: &Ising) -> Option<Self> {
+        samples
+            .iter()
+            .map(|sample| (ising.energy(&sample.bits), sample))
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(energy, Sample { bits, count })| Self {
+                bits: bits.clone(),
+                energy,
+                count: *count,
+            })
+    }
+}
+
 /// The exact optimum and how the run compares with it; energies in the units of the input.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Certificate {
@@ -166,15 +181,7 @@ impl Qaoa {
         };
         let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
         let samples = engine.sample(&angles, settings.shots, &mut rng)?;
-        let best = samples
-            .iter()
-            .map(|sample| (ising.energy(&sample.bits), sample))
-            .min_by(|a, b| a.0.total_cmp(&b.0))
-            .map(|(energy, Sample { bits, count })| BestSample {
-                bits: bits.clone(),
-                energy,
-                count: *count,
-            });
+        let best = BestSample::of(&samples, ising);
 
         let certificate = match exact_optimum(ising) {
             None => None,
