@@ -4,7 +4,7 @@
 //! next places. A walk visits an item at most once for each way that the vehicle can be there, so
 //! that loops end; the number of steps is bounded for missions that are made to be hostile.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 
 use super::Mission;
 use super::altitude::Altitude;
@@ -21,6 +21,7 @@ use super::places::{places, radii, warning};
 use crate::geodesy::LatLon;
 use crate::units::Metres;
 
+mod afterwards;
 mod state;
 
 use state::{Landing, State, Status, bits};
@@ -155,12 +156,7 @@ impl Itinerary<'_> {
                     return Err(LegError::PathNotGiven { item: index, command: item.command });
                 }
                 Role::Hold => {
-                    open.push(State {
-                        navigation: Some(index),
-                        jumped: false,
-                        by_jump: None,
-                        ..next
-                    });
+                    open.push(state.past_item());
                 }
                 Role::Return => self.fly_back(state, &mut open)?,
                 Role::Place(Destination::Takeoff) => {
@@ -245,15 +241,11 @@ impl Itinerary<'_> {
             },
         };
         Ok(Some(State {
-            index: index + 1,
-            navigation: Some(index),
-            jumped: false,
-            by_jump: None,
             position,
             altitude: self.altitude(index, Destination::Takeoff),
             circle: Metres::ZERO,
             status: Status::Flying,
-            ..state
+            ..state.past_item()
         }))
     }
 
@@ -280,13 +272,7 @@ impl Itinerary<'_> {
             }
             return Ok(None);
         }
-        let on = State {
-            index: index + 1,
-            navigation: Some(index),
-            jumped: false,
-            by_jump: None,
-            ..state
-        };
+        let on = state.past_item();
         match (state.status, destination) {
             (Status::Landed, _) => Ok(None),
             (Status::Before, _) => Ok(Some(on)),
@@ -312,14 +298,7 @@ impl Itinerary<'_> {
     fn fly_back(&mut self, state: State, open: &mut Vec<State>) -> Result<(), LegError> {
         let index = state.index;
         if state.status != Status::Flying {
-            let on = State {
-                index: index + 1,
-                navigation: Some(index),
-                jumped: false,
-                by_jump: None,
-                ..state
-            };
-            open.push(on);
+            open.push(state.past_item());
             return Ok(());
         }
         if state.landing.is_some() {
@@ -406,66 +385,6 @@ impl Itinerary<'_> {
             behind_jump: false,
         });
         Ok(())
-    }
-
-    /// Every place is judged, also one that no leg touches, with its whole circle.
-    fn stay_at_places_without_legs(&mut self) {
-        let mut touched: HashMap<[u64; 2], Metres> = HashMap::new();
-        for end in self.legs.iter().flat_map(|leg| [leg.from, leg.to]) {
-            let circle = touched.entry(bits(end.position)).or_insert(end.circle);
-            *circle = circle.max(end.circle);
-        }
-        for (item, &place) in self.places.iter().enumerate() {
-            let (Role::Place(destination), Some(position)) =
-                (self.items[item].command.role(), place)
-            else {
-                continue;
-            };
-            let seen = self.passed_takeoffs.contains(&item);
-            if seen
-                || touched.get(&bits(position)).is_some_and(|&circle| circle >= self.radii[item])
-            {
-                continue;
-            }
-            let altitude = self.altitude(item, destination);
-            let end = LegEnd { item: Some(item), position, altitude, circle: self.radii[item] };
-            self.legs.push(Leg {
-                from: end,
-                to: end,
-                kind: LegKind::Stay,
-                shape: LegShape::Straight,
-                jump: None,
-                insert_before: None,
-                by_jump: None,
-                behind_jump: false,
-            });
-        }
-    }
-
-    /// Marks the legs that the way without jumps does not come to.
-    fn mark_what_is_behind_jumps(&mut self) {
-        let into: HashSet<usize> = self.legs.iter().filter_map(|leg| leg.to.item).collect();
-        let mut onward: HashMap<usize, Vec<usize>> = HashMap::new();
-        let mut open = self.first_places.clone();
-        for leg in self.legs.iter().filter(|leg| leg.jump.is_none()) {
-            match (leg.from.item, leg.to.item) {
-                // Where no leg leads to, a takeoff, a hold or nothing at all does.
-                (Some(from), to) => {
-                    onward.entry(from).or_default().extend(to);
-                    open.extend((!into.contains(&from)).then_some(from));
-                }
-                (None, to) => open.extend(to),
-            }
-        }
-        let mut reached = HashSet::new();
-        while let Some(item) = open.pop() {
-            if reached.insert(item) {
-                open.extend(onward.get(&item).into_iter().flatten());
-            }
-        }
-        for leg in &mut self.legs {
-            leg.behind_jump = leg.from.item.is_some_and(|from| !reached.contains(&from));
-        }
     }
 
     fn shape(&self, destination: Destination, from: &LegEnd, to: &LegEnd) -> LegShape {

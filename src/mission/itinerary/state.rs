@@ -81,6 +81,18 @@ impl State {
         }
     }
 
+    /// On to the next item, the one at hand being an item of navigation that does not change where
+    /// the vehicle is.
+    pub(super) fn past_item(self) -> Self {
+        Self {
+            index: self.index + 1,
+            navigation: Some(self.index),
+            jumped: false,
+            by_jump: None,
+            ..self
+        }
+    }
+
     /// What tells apart the ways of being at an item within one walk.
     pub(super) fn key(&self) -> StateKey {
         StateKey {
