@@ -64,7 +64,10 @@ for path in sorted(EXAMPLES.iterdir()):
     if path.is_file() and path.suffix != ".md" and path.stat().st_size < 6000:
         put("files", path.name, path.read_bytes())
 with zipfile.ZipFile(CORPUS / "files" / "one-polygon.kmz", "w", zipfile.ZIP_DEFLATED) as archive:
-    archive.write(EXAMPLES / "one-polygon.kml", "doc.kml")
+    # With no time in it, so that it is the same file each time.
+    info = zipfile.ZipInfo("doc.kml")
+    info.compress_type = zipfile.ZIP_DEFLATED
+    archive.writestr(info, (EXAMPLES / "one-polygon.kml").read_bytes())
 put("files", "old-fence.txt", b"47 8\n47 8\n47.1 8\n47.1 8.1\n47 8\n")
 put("files", "old-rally.txt", b"RALLY 47.5 8.25 40 20 90 1\n")
 survey = {"type": "ComplexItem", "complexItemType": "survey", "version": 5,
@@ -87,6 +90,25 @@ for name in NAMES:
     put("frames", name, b"\xff\x05hello" + answers(mission, 0) + b"\xff\x03\xfd\xfe\x00")
     ack = chunk(8, bytes([255, 190, 0, 0]))
     put("download", name, answers(mission, 0) + ack + answers(fence, 1))
+
+
+def plan_file(items, mission_type):
+    """ArduPilot's file of a plan."""
+    body = b"".join(raw[:28] + struct.pack("<H", seq) + raw[30:] + bytes([mission_type])
+                    for seq, raw in enumerate(items))
+    return struct.pack("<5H", 0x763D, mission_type, 0, 0, len(items)) + body
+
+
+for number, name in enumerate(NAMES):
+    plan = json.loads((EXAMPLES / f"{name}.plan").read_text())
+    mission_type = number % 2
+    content = plan_file(fence_items(plan) if mission_type else plan_items(plan), mission_type)
+    faults = [b"", bytes([0, 0, 2, 0, 1, 0]), bytes([0, 0, 0, 0, 3, 9]), bytes([0, 0, 4, 129]), bytes([0, 0, 11, 20])]
+    put("plan_files", name, struct.pack("<H", len(content)) + content + faults[number])
+    # REQUEST (ArduPilot) or REQUEST_INT for each item, then ACK.
+    items, which = (4 + number % 4), (number % 2) * 128
+    asked = b"".join(chunk(9 if which else 3, struct.pack("<HBBB", seq, 1, 195, 0)) for seq in range(items))
+    put("upload", name, bytes([which | items]) + asked + chunk(8, bytes([1, 195, [0, 4, 13, 15, 1][number], 0])))
 
 
 def device(qubits, entangler):
@@ -112,3 +134,48 @@ def device(qubits, entangler):
 
 for qubits, entangler in [(2, "cz"), (3, "ecr"), (5, "cx"), (4, "cz"), (7, "ecr")]:
     put("device", f"{qubits}-{entangler}", device(qubits, entangler))
+
+
+ROWS = ['connect = "udpin:0.0.0.0:14550"', 'buffer = 8', 'policy = "on_change"', 'fence = ["a.plan", "b.kml"]',
+        'rounds = 12\nseed = 0x10', 'paper = true']
+for number in range(1, len(ROWS) + 1):
+    put("configuration", f"{number}.toml", ("\n".join(ROWS[:number]) + "\n").encode())
+
+
+def measured(registers, shots):
+    results = [{"data": {"c": {"samples": [hex(min(shot, 2 ** bits - 1)) for shot in range(shots)],
+                               "num_bits": bits}}, "metadata": {}} for bits in registers]
+    return bytes([shots]) + json.dumps({"results": results, "metadata": {"version": 2}}).encode()
+
+
+for number, registers in enumerate([[1], [1, 3, 70], [1, 3, 70], [1], [3]]):
+    put("results", f"{number}", measured(registers, number + 1))
+
+
+def said(status, document):
+    """An answer, as `targets::service` takes it; `status` counts in its list."""
+    body = json.dumps(document).encode()
+    return struct.pack("<BH", status, len(body)) + body
+
+
+TOKEN = said(0, {"access_token": "t", "expires_in": 3600})
+REFUSED = {"errors": [{"code": 1234, "message": "no", "solution": "wait"}], "trace": "x"}
+backends = {"devices": [{"name": "ibm_small", "status": {"name": "online"}, "qubits": 5, "queue_length": 1,
+                         "processor_type": {"family": "Heron", "revision": "2"}}]}
+configuration, properties = device(2, "cz").split(b"\0")
+plain = lambda raw: struct.pack("<BH", 0, len(raw)) + raw  # noqa: E731
+state = lambda name: said(0, {"id": "job", "state": {"status": name, "reason": "r", "reason_code": 1305}})  # noqa: E731
+for name, call, replies in [
+    ("usage", 0, said(0, {"usage_consumed_seconds": 1, "usage_limit_seconds": 600})),
+    ("backends", 1, said(0, backends)),
+    ("device", 2, plain(configuration) + plain(properties)),
+    ("batch", 3, said(1, {"id": "b-1"})),
+    ("state", 4, state("Failed")),
+    ("results", 5, state("Queued") + state("Completed") + said(3, REFUSED) + state("Completed") + plain(b"{}")),
+    ("metrics", 6, said(0, {"usage": {"qpu_charge_time_seconds": 2.5}})),
+    ("cancel", 7, said(2, {})),
+    ("submit", 8, said(8, {}) + said(0, {"jobs": []}) + said(0, {"jobs": [{"id": "j", "tags": ["quavd-1"]}]})),
+    ("submit-unknown", 8, said(5, REFUSED) + said(0, backends)),
+]:
+    put("service", name, bytes([call]) + TOKEN + replies)
+put("service", "no-token", bytes([0]) + said(3, {"errorCode": "BXNIM0415E", "errorMessage": "no key"}))

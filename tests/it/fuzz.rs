@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-#[path = "../fuzz/src/targets.rs"]
+#[path = "../fuzz/src/targets/mod.rs"]
 mod targets;
 
 #[test]
