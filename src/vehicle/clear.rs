@@ -20,6 +20,7 @@ impl Vehicle {
             MissionClearAll { target: exchange.target(), mission_type: exchange.wire_type() };
         let mut patience = Patience::new();
         let mut busy = BusyWait::default();
+        let mut restarts = 0;
         loop {
             exchange.send(&clear).await?;
             let deadline = Instant::now() + self.timing.request;
@@ -41,6 +42,12 @@ impl Vehicle {
                 }
             }
             if exchange.is_hopeless(&mut patience) {
+                // Clearing twice is clearing once: while the vehicle is heard, it is asked again.
+                if restarts < self.timing.restarts && self.is_alive() {
+                    restarts += 1;
+                    patience.renew();
+                    continue;
+                }
                 return Err(exchange.no_answer(Awaited::Acknowledgement, patience.waited()));
             }
         }

@@ -1,6 +1,7 @@
 //! The mission protocol against a scripted autopilot in memory, with paused time: each test is the
 //! conversation it checks.
 
+mod clear;
 mod discovery;
 mod download;
 mod parameter;
