@@ -156,10 +156,9 @@ impl Sink {
     /// network cannot carry just now: MAVLink repeats what matters.
     pub(super) async fn send(&mut self, frame: &[u8]) -> io::Result<()> {
         match self {
-            Self::Stream(stream) => {
-                stream.write_all(frame).await?;
-                stream.flush().await
-            }
+            // Not flushed: of a serial port that would be tcdrain(3), which holds up the thread, and
+            // with it the reader, until the last byte has left.
+            Self::Stream(stream) => stream.write_all(frame).await,
             Self::Datagrams { socket, peer } => {
                 let Some(address) = peer.address() else { return Ok(()) };
                 match socket.send_to(frame, address).await {
