@@ -18,7 +18,6 @@ from .dialect import mavlink
 MOST_UDP_PEERS = 16
 SERIAL_QUEUE_BYTES = 256 * 1024
 SERIAL_CHUNK = 32
-SERIAL_LATENESS_S = 0.002
 
 
 class Wire:
@@ -256,7 +255,11 @@ class TcpLink(Link):
 class PtyLink(Link):
     """A serial line: the slave side of a pty in raw mode, optionally under a chosen path.
 
-    With `baud`, both directions move no more than baud / 10 bytes a second, as a UART would.
+    With `baud`, both directions move no more than baud / 10 bytes a second, as a UART would. Timers
+    of this program are late by a millisecond, and by more on a busy machine; a line is not. So what
+    an event is late is given back to what follows from it: an answer begins to cross when the request
+    was due, and bytes that come after a frame was delivered late are taken to have come that much
+    earlier.
     """
 
     def __init__(self, vehicle, number, path=None, baud=None):
@@ -265,6 +268,8 @@ class PtyLink(Link):
         self.queue, self.queued, self.writing = deque(), 0, False
         self.unread_before = self.written = 0
         self.incoming_free = self.outgoing_free = 0.0
+        self.arrival_late = 0.0   # of what is being received at this moment
+        self.delivery_late = 0.0  # of the last frame that was delivered, until bytes come
 
     async def open(self):
         # The slave stays open here too: its raw mode must not be lost when the peer closes it.
@@ -282,26 +287,44 @@ class PtyLink(Link):
         self.vehicle.loop.call_later(1.0, self._flush_if_unread)
 
     def _readable(self):
-        try:
-            data = os.read(self.master, 4096 if not self.baud else SERIAL_CHUNK)
-        except (BlockingIOError, InterruptedError):
-            return
-        except OSError:
-            self.vehicle.loop.remove_reader(self.master)
+        """Bytes have come to a line that was at rest."""
+        data = self._read()
+        if not data:
             return
         if not self.baud:
             self.channel.receive(data)
             return
-        # The bytes are there when the last of them has crossed the line; meanwhile nothing is read.
         self.vehicle.loop.remove_reader(self.master)
-        earliest = self.vehicle.loop.time() - SERIAL_LATENESS_S  # so that late timers do not slow the line
-        self.incoming_free = max(earliest, self.incoming_free) + self._crossing_s(data)
+        self.incoming_free = max(self.vehicle.loop.time() - self.delivery_late, self.incoming_free)
+        self.delivery_late = 0.0
+        self._cross(data)
+
+    def _read(self):
+        try:
+            return os.read(self.master, 4096 if not self.baud else SERIAL_CHUNK)
+        except (BlockingIOError, InterruptedError):
+            pass
+        except OSError:
+            self.vehicle.loop.remove_reader(self.master)
+        return b""
+
+    def _cross(self, data):
+        """The bytes are there when the last of them has crossed the line; meanwhile nothing is read."""
+        self.incoming_free += self._crossing_s(data)
         self.vehicle.loop.call_at(self.incoming_free, self._arrived, data)
 
     def _arrived(self, data):
-        if self.master is not None:
+        if self.master is None:
+            return
+        late = self.vehicle.loop.time() - self.incoming_free
+        waiting = self._read()
+        if waiting:  # they follow without a gap
+            self._cross(waiting)
+        else:
             self.vehicle.loop.add_reader(self.master, self._readable)
-            self.channel.receive(data)
+        self.arrival_late = late
+        self.channel.receive(data)
+        self.arrival_late = 0.0
 
     def _crossing_s(self, data):
         return len(data) * 10 / self.baud
@@ -312,7 +335,7 @@ class PtyLink(Link):
         self.queue.append(data)
         self.queued += len(data)
         if not self.writing:
-            self.outgoing_free = max(self.vehicle.loop.time(), self.outgoing_free)
+            self.outgoing_free = max(self.vehicle.loop.time() - self.arrival_late, self.outgoing_free)
             self._next_frame()
 
     def _next_frame(self):
@@ -339,12 +362,15 @@ class PtyLink(Link):
             written = len(frame)
         self.queued -= written
         self.written += written
+        self.delivery_late = 0.0
         if written < len(frame):  # the reader is slow: wait for room
             self.queue.appendleft(frame[written:])
             self.vehicle.loop.call_later(0.005, self._put)
         elif self.queue and not self.baud:
             self.vehicle.loop.call_soon(self._put)
         else:
+            if self.baud:
+                self.delivery_late = self.vehicle.loop.time() - self.outgoing_free
             self._next_frame()
 
     def _flush_if_unread(self):

@@ -69,6 +69,12 @@ impl FakeVehicle {
         Self { process, control: BufReader::new(control), urls }
     }
 
+    /// Its process.
+    #[allow(dead_code)] // for the benchmark of transfers
+    pub(crate) fn pid(&self) -> u32 {
+        self.process.id()
+    }
+
     /// Where to connect to.
     pub(crate) fn endpoint(&self) -> Endpoint {
         self.urls[0].parse().unwrap()
