@@ -7,7 +7,7 @@ use crate::replan::Replanned;
 use crate::vehicle::{Autopilot, VehicleState};
 
 /// A mission that is being flown.
-pub(super) struct Flight {
+pub(crate) struct Flight {
     /// All of it, in quavd's numbering.
     whole: Mission,
     /// Index of the item that the vehicle flies to.
@@ -64,7 +64,7 @@ impl Flight {
     /// # Errors
     /// [`CliError::NoPath`] where the vehicle would have to go another way to the item it flies
     /// to: that item is not changed under way.
-    pub(super) fn with(&self, planned: &Replanned) -> Result<Mission, CliError> {
+    pub(crate) fn with(&self, planned: &Replanned) -> Result<Mission, CliError> {
         if planned.inserted.first() == Some(&NEXT) {
             return Err(CliError::NoPath {
                 reason: format!(

@@ -9,7 +9,7 @@ use tokio_util::sync::CancellationToken;
 use super::CliError;
 use super::files::{self, out_format};
 use super::flight::Flight;
-use super::options::{PlanningArgs, VehicleArgs, as_qpu};
+use super::options::{PlanningArgs, VehicleArgs, WritingArgs, as_qpu};
 use super::plan::{Delivered, Outcome, planned_scenario};
 use super::progress::Shown;
 use super::signing::SigningArgs;
@@ -28,7 +28,7 @@ use crate::vehicle::download::Downloaded;
 use crate::vehicle::numbering::{to_mission, to_vehicle};
 use crate::vehicle::readback::differences;
 use crate::vehicle::replace::{Replacement, WhileArmed, pilots_own, replace, restore, settle};
-use crate::vehicle::{Autopilot, Search, Timing, TransferError, Vehicle, find};
+use crate::vehicle::{Autopilot, TransferError, Vehicle, find};
 
 /// How long to wait for the vehicle's home and position.
 const PLACE_PATIENCE: Duration = Duration::from_secs(5);
@@ -46,16 +46,9 @@ pub struct OnceArgs {
     /// Put back the mission (and fence) that the vehicle held before quavd wrote to it, and exit.
     #[arg(long, conflicts_with_all = ["dry_run", "out"])]
     pub restore: bool,
-    /// Also write to an armed vehicle: only items after the one it flies to, to an ArduPilot only
-    /// while it does not fly its mission, and only if the way to that item is clear.
-    #[arg(long)]
-    pub in_flight: bool,
-    /// Most mission items the vehicle has room for; more are refused before anything is written.
-    #[arg(long, value_name = "N")]
-    pub max_items: Option<u16>,
-    /// The vehicle is a simulation that runs this many times faster: so do all waiting times.
-    #[arg(long, default_value_t = 1.0, value_parser = speedup, value_name = "X")]
-    pub speedup: f64,
+    /// On what terms it writes.
+    #[command(flatten)]
+    pub writing: WritingArgs,
     /// Which vehicle.
     #[command(flatten)]
     pub vehicle: VehicleArgs,
@@ -72,13 +65,6 @@ pub struct OnceArgs {
     /// How to plan.
     #[command(flatten)]
     pub planning: PlanningArgs,
-}
-
-fn speedup(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if (0.1..=100.0).contains(&value) => Ok(value),
-        _ => Err(format!("'{text}' is not a number from 0.1 to 100")),
-    }
 }
 
 /// Runs the command; returns what goes to stdout.
@@ -113,8 +99,7 @@ pub fn run(args: OnceArgs, shown: &Shown) -> Result<String, CliError> {
 async fn with_link(args: &OnceArgs, link: &Link, shown: &Shown) -> Result<String, CliError> {
     let store = Store::open(&args.vehicle.state_directory()?)?;
     shown.doing("waiting for the vehicle");
-    let timing = Timing::default().faster(args.speedup);
-    let vehicle = find(link, &Search { timing, ..args.vehicle.search() }).await?;
+    let vehicle = find(link, &args.vehicle.search()).await?;
     let outcome = with_vehicle(args, &vehicle, &store, shown).await;
     vehicle.close().await;
     outcome
@@ -127,7 +112,7 @@ async fn with_vehicle(
     shown: &Shown,
 ) -> Result<String, CliError> {
     let mut on_step = |step| shown.step(step);
-    let while_armed = if args.in_flight { WhileArmed::Allow } else { WhileArmed::Refuse };
+    let while_armed = args.writing.while_armed();
     if args.restore {
         return put_back(vehicle, store, while_armed, shown).await;
     }
@@ -144,7 +129,7 @@ async fn with_vehicle(
     let began = Instant::now();
     let held = Held::download(vehicle, shown).await?;
     let mut read = read(vehicle, store, &args.planning, held, shown).await?;
-    let flight = if args.in_flight { in_flight(vehicle, &mut read)? } else { None };
+    let flight = in_flight(vehicle, &mut read, &args.writing)?;
     shown.warn(&read.scenario.warnings);
     let options = read.options(&args.planning);
     if read.scenario.mission.items.is_empty() {
@@ -161,18 +146,7 @@ async fn with_vehicle(
 
     let mut done = Delivery { written: false, verified: false };
     if let Ok(planned) = &outcome.planned {
-        let home_slot =
-            (vehicle.autopilot() == Autopilot::ArduPilot).then(|| read.held.first()).flatten();
-        let mission = match &flight {
-            Some(flight) => flight.with(planned)?,
-            None => planned.mission.clone(),
-        };
-        let intended = match (planned.is_changed(), &flight) {
-            (true, _) => to_vehicle(vehicle.autopilot(), &mission, home_slot),
-            (false, Some(_)) => read.held.clone(),
-            (false, None) => read.original.clone(),
-        };
-        fits(&mission, args.max_items)?;
+        let intended = intended(vehicle, &read, planned, flight.as_ref(), &args.writing)?;
         let same = differences(vehicle.autopilot(), MissionType::Mission, &intended, &read.held)
             .is_empty();
         done.verified = same;
@@ -194,10 +168,18 @@ async fn with_vehicle(
     outcome.told(args.json, Some(done.told(vehicle, args.dry_run)))
 }
 
-/// Where the vehicle is armed: only the rest of what it flies is to be planned, from where it is.
-fn in_flight(vehicle: &Vehicle, read: &mut Read) -> Result<Option<Flight>, CliError> {
+/// Where the vehicle is armed, and may be written to: only the rest of what it flies is to be
+/// planned, from where it is.
+///
+/// # Errors
+/// [`CliError::Refused`] where that rest does not stand for itself.
+pub(crate) fn in_flight(
+    vehicle: &Vehicle,
+    read: &mut Read,
+    writing: &WritingArgs,
+) -> Result<Option<Flight>, CliError> {
     let state = vehicle.state();
-    if !state.is_armed() {
+    if !writing.in_flight || !state.is_armed() {
         return Ok(None);
     }
     // What the vehicle flies is what it holds, whatever that was made from.
@@ -208,16 +190,29 @@ fn in_flight(vehicle: &Vehicle, read: &mut Read) -> Result<Option<Flight>, CliEr
     Ok(Some(flight))
 }
 
-/// Whether the vehicle has room for a mission, as far as that was told.
-fn fits(mission: &Mission, most: Option<u16>) -> Result<(), CliError> {
-    let items = mission.items.len();
-    match most {
-        Some(most) if items > usize::from(most) => Err(CliError::Refused(format!(
-            "the new mission has {items} items, more than the {most} of --max-items; nothing was \
-             written. Plan with fewer waypoints (--max-waypoints N)"
-        ))),
-        _ => Ok(()),
-    }
+/// The mission list that the vehicle is to hold, in its numbering.
+///
+/// # Errors
+/// [`CliError`] where it has no room for that, or would have to turn in flight.
+pub(crate) fn intended(
+    vehicle: &Vehicle,
+    read: &Read,
+    planned: &Replanned,
+    flight: Option<&Flight>,
+    writing: &WritingArgs,
+) -> Result<Vec<MissionItem>, CliError> {
+    let autopilot = vehicle.autopilot();
+    let home_slot = (autopilot == Autopilot::ArduPilot).then(|| read.held.first()).flatten();
+    let mission = match flight {
+        Some(flight) => flight.with(planned)?,
+        None => planned.mission.clone(),
+    };
+    writing.room_for(&mission)?;
+    Ok(match (planned.is_changed(), flight) {
+        (true, _) => to_vehicle(autopilot, &mission, home_slot),
+        (false, Some(_)) => read.held.clone(),
+        (false, None) => read.original.clone(),
+    })
 }
 
 /// What `--restore` does: both plans that quavd may have written.

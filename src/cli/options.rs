@@ -12,12 +12,14 @@ use crate::geodesy::Zone;
 use crate::ibm::client::backends::BackendChoice;
 use crate::ibm::qpu::IbmQpu;
 use crate::link::{ComponentId, Identity, SystemId};
+use crate::mission::Mission;
 use crate::planner::{CandidateSource, QpuSettings, QpuTraining, Rounds, Settings};
 use crate::qaoa::qpu::Qpu;
 use crate::qaoa::{EngineChoice, EngineKind};
 use crate::replan::{Options, Vertical};
 use crate::units::Metres;
-use crate::vehicle::Search;
+use crate::vehicle::replace::WhileArmed;
+use crate::vehicle::{Search, Timing};
 
 /// Distances to keep and fences to respect, for planning and checking.
 #[derive(Debug, Clone, Args)]
@@ -108,6 +110,10 @@ pub(super) fn cvar(text: &str) -> Result<f64, String> {
     number(text, 0.001, 1.0)
 }
 
+fn speedup(text: &str) -> Result<f64, String> {
+    number(text, 0.1, 100.0)
+}
+
 fn deadline(text: &str) -> Result<f64, String> {
     number(text, 0.001, 1e6)
 }
@@ -128,6 +134,9 @@ pub struct VehicleArgs {
     /// How long to wait for the vehicle's first heartbeat, seconds.
     #[arg(long, default_value_t = 15, value_parser = clap::value_parser!(u16).range(1..), value_name = "S")]
     pub wait: u16,
+    /// The vehicle is a simulation that runs this many times faster: so do all waiting times.
+    #[arg(long, default_value_t = 1.0, value_parser = speedup, value_name = "X")]
+    pub speedup: f64,
     /// Where originals and upload records are kept.
     #[arg(long, env = "STATE_DIRECTORY", value_name = "DIR")]
     pub state_dir: Option<PathBuf>,
@@ -149,7 +158,7 @@ impl VehicleArgs {
         Search {
             system: self.system.map(SystemId),
             patience: Duration::from_secs(u64::from(self.wait)),
-            ..Search::default()
+            timing: Timing::default().faster(self.speedup),
         }
     }
 
@@ -173,6 +182,41 @@ pub(super) fn state_directory(chosen: Option<&PathBuf>) -> Result<PathBuf, CliEr
         .or_else(|| std::env::home_dir().map(|home| home.join(".local/state")));
     base.map(|base| base.join("quavd"))
         .ok_or_else(|| CliError::Usage("no place for records: give --state-dir DIR".to_owned()))
+}
+
+/// On what terms the vehicle is written to.
+#[derive(Debug, Clone, Args)]
+pub struct WritingArgs {
+    /// Also write to an armed vehicle: only items after the one it flies to, to an ArduPilot only
+    /// while it does not fly its mission, and only if the way to that item is clear.
+    #[arg(long)]
+    pub in_flight: bool,
+    /// Most mission items the vehicle has room for; more are refused before anything is written.
+    #[arg(long, value_name = "N")]
+    pub max_items: Option<u16>,
+}
+
+impl WritingArgs {
+    /// What an armed vehicle means.
+    #[must_use]
+    pub fn while_armed(&self) -> WhileArmed {
+        if self.in_flight { WhileArmed::Allow } else { WhileArmed::Refuse }
+    }
+
+    /// Whether the vehicle has room for a mission, as far as that was told.
+    ///
+    /// # Errors
+    /// [`CliError::Refused`].
+    pub fn room_for(&self, mission: &Mission) -> Result<(), CliError> {
+        let items = mission.items.len();
+        match self.max_items {
+            Some(most) if items > usize::from(most) => Err(CliError::Refused(format!(
+                "the new mission has {items} items, more than the {most} of --max-items; nothing \
+                 was written. Plan with fewer waypoints (--max-waypoints N)"
+            ))),
+            _ => Ok(()),
+        }
+    }
 }
 
 /// How to plan.

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use clap::{ArgAction, Args};
 
-use crate::cli::options::{PlanningArgs, VehicleArgs};
+use crate::cli::options::{PlanningArgs, VehicleArgs, WritingArgs};
 use crate::cli::signing::SigningArgs;
 use crate::link::Endpoint;
 
@@ -26,6 +26,9 @@ pub struct DaemonOptions {
     /// Which vehicle, and who quavd is on it.
     #[command(flatten, next_help_heading = "Vehicle")]
     pub vehicle: VehicleArgs,
+    /// On what terms it writes.
+    #[command(flatten)]
+    pub writing: WritingArgs,
     /// Who is believed.
     #[command(flatten, next_help_heading = "Signing")]
     pub signing: SigningArgs,

@@ -20,6 +20,7 @@ const EXAMPLES: &[(&str, &str)] = &[
     ("deadline", "10"),
     ("ground_relief", "3"),
     ("cvar", "0.2"),
+    ("max_items", "650"),
     ("max_waypoints", "40"),
     ("backend", "least_busy"),
     ("api_key_file", "ibm-api-key"),

@@ -155,7 +155,9 @@ impl Answer {
     /// What stood in the way of writing.
     pub(super) fn not_written(obstacle: &Obstacle, before: Self) -> Self {
         let (verdict, words) = match (obstacle, obstacle.failure()) {
-            (Obstacle::Armed, _) => (Verdict::Armed, "vehicle is armed, plan not uploaded"),
+            (Obstacle::Armed | Obstacle::FlyingMission, _) => {
+                (Verdict::Armed, "vehicle is armed, plan not uploaded")
+            }
             (_, Failure::Unreachable) => (Verdict::Unreachable, "link lost during upload"),
             (_, Failure::Refused) => (Verdict::Refused, "vehicle refused the plan"),
             (_, Failure::Local) => (Verdict::Local, "cannot save the old mission: no upload"),

@@ -13,7 +13,7 @@ use tokio::task::JoinHandle;
 
 use super::answer::{Answer, Verdict};
 use crate::cli::CliError;
-use crate::cli::once::{Held, Read, read};
+use crate::cli::once::{Held, Read, in_flight, intended, read};
 use crate::cli::options::as_qpu;
 use crate::cli::progress::Shown;
 use crate::config::DaemonOptions;
@@ -25,11 +25,8 @@ use crate::report::json::PlanDocument;
 use crate::report::picture::picture;
 use crate::stop::Stop;
 use crate::store::Store;
-use crate::vehicle::numbering::to_vehicle;
 use crate::vehicle::readback::differences;
-use crate::vehicle::replace::{
-    Obstacle, ReplaceError, Replacement, Step, WhileArmed, replace, settle,
-};
+use crate::vehicle::replace::{Obstacle, ReplaceError, Replacement, Step, replace, settle};
 use crate::vehicle::{Autopilot, Vehicle};
 
 /// A vehicle does not wait longer for a QPU's queue, unless the configuration sets a deadline.
@@ -253,7 +250,9 @@ async fn work(
         read = read(vehicle, store, &options.planning, held.clone(), &quiet) => read,
         () = gate.cancelled() => return Ok(End::Cancelled),
     };
-    let read = read.map_err(|error| known(Answer::from_cli(error)))?;
+    let mut read = read.map_err(|error| known(Answer::from_cli(error)))?;
+    let flight = in_flight(vehicle, &mut read, &options.writing);
+    let flight = flight.map_err(|error| known(Answer::from_cli(error)))?;
     let load = began.elapsed();
 
     let mut planning = read.options(&options.planning);
@@ -278,7 +277,15 @@ async fn work(
     let drawn = picture(&planned, &run, &format!("mission of {}", vehicle.node()));
     let mut answer = Answer::planned(&planned, document, drawn.ok());
     answer.fingerprint = Some(fingerprint);
-    deliver(order, gate, phase, (&input, &read), &planned, &mut answer).await;
+    match intended(vehicle, &read, &planned, flight.as_ref(), &options.writing) {
+        Ok(intended) => {
+            deliver(order, gate, phase, (&input, read), intended, &planned, &mut answer).await;
+        }
+        Err(error) => {
+            let Answer { verdict, texts, reason, .. } = *Answer::from_cli(error);
+            answer = Answer { verdict, texts, reason, ..answer };
+        }
+    }
     if answer.verdict == Verdict::Cancelled {
         return Ok(End::Cancelled);
     }
@@ -295,9 +302,9 @@ async fn settled(
         return Ok(false);
     }
     let mut on_step = |step| tell(phase, step);
+    let while_armed = order.options.writing.while_armed();
     for plan in [MissionType::Fence, MissionType::Mission] {
-        let settled =
-            settle(&order.vehicle, &order.store, plan, WhileArmed::Refuse, &mut on_step).await;
+        let settled = settle(&order.vehicle, &order.store, plan, while_armed, &mut on_step).await;
         match settled {
             Ok(None) => {}
             Ok(Some(settled)) => {
@@ -362,18 +369,13 @@ async fn deliver(
     order: &Order,
     gate: &Gate,
     phase: &watch::Sender<Phase>,
-    (input, read): (&Held, &Read),
+    (input, read): (&Held, Read),
+    intended: Vec<MissionItem>,
     planned: &Replanned,
     answer: &mut Answer,
 ) {
-    let Order { vehicle, store, .. } = order;
+    let Order { vehicle, store, options, .. } = order;
     let autopilot = vehicle.autopilot();
-    let home_slot = (autopilot == Autopilot::ArduPilot).then(|| read.held.first()).flatten();
-    let intended = if planned.is_changed() {
-        to_vehicle(autopilot, &planned.mission, home_slot)
-    } else {
-        read.original.clone()
-    };
     if differences(autopilot, MissionType::Mission, &intended, &read.held).is_empty() {
         answer.already_there(planned);
         return;
@@ -384,12 +386,12 @@ async fn deliver(
     }
     let replacement = Replacement {
         mission_type: MissionType::Mission,
-        original: read.original.clone(),
-        before: read.held.clone(),
+        original: read.original,
+        before: read.held,
         intended,
     };
     let mut on_step = |step| tell(phase, step);
-    match replace(vehicle, store, replacement, WhileArmed::Refuse, &mut on_step).await {
+    match replace(vehicle, store, replacement, options.writing.while_armed(), &mut on_step).await {
         Ok(record) => {
             answer.uploaded(record.intended.len());
             answer.fingerprint = after_upload(vehicle, input, &record.intended).await;

@@ -362,3 +362,29 @@ fn a_bad_configuration_ends_with_2_and_every_mistake_named() {
         assert!(said.contains("did you mean buffer?"), "{said}");
     }
 }
+
+#[test]
+fn in_flight_it_writes_where_the_configuration_allows_it_and_the_vehicle_flies_on() {
+    let mut vehicle = vehicle_with("px4", "s5");
+    let dump = vehicle.dump();
+    let first = &dump["mission"]["items"][0];
+    let degrees = |axis: &str| first[axis].as_f64().unwrap() / 1e7;
+    let above = json!([degrees("x"), degrees("y"), dump["home"]["alt"].as_f64().unwrap() + 30.0]);
+    vehicle.control(&json!({
+        "cmd": "set", "armed": true, "mode": "MISSION", "current": 0, "position": above
+    }));
+    let daemon = Daemon::start(&vehicle.urls[0], "in_flight = true");
+    let status = daemon.wait_for_answer(1);
+    assert_eq!(verdict(&status), "uploaded", "{status:#?}");
+    assert_eq!(vehicle.judged()["collisions"], 0);
+    assert_eq!(vehicle.dump()["current_seq"], 0);
+}
+
+#[test]
+fn a_mission_that_the_vehicle_has_no_room_for_is_not_begun() {
+    let mut vehicle = vehicle_with("ardupilot", "s1");
+    let daemon = Daemon::start(&vehicle.urls[0], "max_items = 2");
+    let status = daemon.wait_for_answer(1);
+    assert_eq!(verdict(&status), "refused", "{status:#?}");
+    assert_eq!(vehicle.dump()["uploads"].as_array().unwrap().len(), 0);
+}
