@@ -1,10 +1,13 @@
 //! Planning for a vehicle in flight: only the rest of its mission is planned, from where it is.
 
 use super::CliError;
+use super::once::Read;
 use crate::geodesy::LatLon;
 use crate::mission::{Command, Frame, Mission, MissionItem, rejoined, remaining};
-use crate::replan::Replanned;
-use crate::vehicle::{Autopilot, VehicleState};
+use crate::replan::judge::{LegVerdict, judge};
+use crate::replan::{Input, Options, Replanned};
+use crate::vehicle::numbering::to_mission;
+use crate::vehicle::{Autopilot, Vehicle, VehicleState};
 
 /// A mission that is being flown.
 pub(crate) struct Flight {
@@ -66,18 +69,47 @@ impl Flight {
     /// to: that item is not changed under way.
     pub(crate) fn with(&self, planned: &Replanned) -> Result<Mission, CliError> {
         if planned.inserted.first() == Some(&NEXT) {
-            return Err(CliError::NoPath {
-                reason: format!(
-                    "the way from where the vehicle is to item {} is not clear, and the current \
-                     item is not changed in flight; stop the vehicle and plan on the ground",
-                    self.current + 1
-                ),
-                document: None,
-            });
+            return Err(self.not_clear());
         }
         let rest = remaining(&planned.mission, NEXT).map_err(|error| {
             CliError::Refused(format!("the planned mission is not complete: {error}"))
         })?;
         Ok(rejoined(&self.whole, self.current, &rest))
     }
+
+    fn not_clear(&self) -> CliError {
+        let reason = format!(
+            "the way from where the vehicle is to item {} is not clear, and the current item is not \
+             changed in flight; stop the vehicle and plan on the ground",
+            self.current + 1
+        );
+        CliError::NoPath { reason, document: None }
+    }
+}
+
+/// Whether the way from where the vehicle is by now to the item that it flies to is clear, where
+/// it holds `list`: planning and uploading take time, in which it moves.
+///
+/// # Errors
+/// [`CliError::NoPath`] where it is not, [`CliError::Refused`] where that cannot be told.
+pub(crate) fn way_is_clear(
+    vehicle: &Vehicle,
+    read: &Read,
+    list: &[MissionItem],
+    options: &Options,
+) -> Result<(), CliError> {
+    let state = vehicle.state();
+    let autopilot = vehicle.autopilot();
+    let flight = Flight::of(&state, autopilot, to_mission(autopilot, list, state.home))?;
+    let input = Input {
+        mission: &flight.rest,
+        fences: &read.scenario.fences,
+        rally: &read.rally,
+        start: Some(flight.position),
+        autopilot: read.autopilot,
+    };
+    // PROJ blocks, for some milliseconds.
+    let verdict = tokio::task::block_in_place(|| judge(&input, options))?;
+    let mut way = verdict.legs.iter().filter(|it| it.leg.to.item == Some(NEXT));
+    if way.all(LegVerdict::is_clear) { Ok(()) } else { Err(flight.not_clear()) }
 }

@@ -15,7 +15,7 @@ pub mod check;
 pub mod compare;
 pub mod exit;
 pub mod files;
-mod flight;
+pub(crate) mod flight;
 pub mod generate;
 pub mod ibm;
 pub mod memory;

@@ -8,7 +8,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::CliError;
 use super::files::{self, out_format};
-use super::flight::Flight;
+use super::flight::{Flight, way_is_clear};
 use super::options::{PlanningArgs, VehicleArgs, WritingArgs, as_qpu};
 use super::plan::{Delivered, Outcome, planned_scenario};
 use super::progress::Shown;
@@ -157,8 +157,16 @@ async fn with_vehicle(
                 before: read.held.clone(),
                 intended,
             };
-            replace(vehicle, store, replacement, while_armed, &mut on_step).await?;
+            if flight.is_some() {
+                way_is_clear(vehicle, &read, &replacement.intended, &options)?;
+            }
+            let record = replace(vehicle, store, replacement, while_armed, &mut on_step).await?;
             done = Delivery { written: true, verified: true };
+            if flight.is_some()
+                && let Err(error) = way_is_clear(vehicle, &read, &record.intended, &options)
+            {
+                shown.warn(&[format!("the new mission is on the vehicle, but {error}")]);
+            }
         }
         shown.clear();
         let title = format!("mission of {}", args.connect);

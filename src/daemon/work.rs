@@ -13,6 +13,7 @@ use tokio::task::JoinHandle;
 
 use super::answer::{Answer, Verdict};
 use crate::cli::CliError;
+use crate::cli::flight::way_is_clear;
 use crate::cli::once::{Held, Read, in_flight, intended, read};
 use crate::cli::options::as_qpu;
 use crate::cli::progress::Shown;
@@ -277,7 +278,12 @@ async fn work(
     let drawn = picture(&planned, &run, &format!("mission of {}", vehicle.node()));
     let mut answer = Answer::planned(&planned, document, drawn.ok());
     answer.fingerprint = Some(fingerprint);
-    match intended(vehicle, &read, &planned, flight.as_ref(), &options.writing) {
+    let list = intended(vehicle, &read, &planned, flight.as_ref(), &options.writing);
+    let list = list.and_then(|list| match &flight {
+        Some(_) => way_is_clear(vehicle, &read, &list, &planning).map(|()| list),
+        None => Ok(list),
+    });
+    match list {
         Ok(intended) => {
             deliver(order, gate, phase, (&input, read), intended, &planned, &mut answer).await;
         }

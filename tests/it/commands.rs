@@ -231,6 +231,13 @@ fn every_example_plans_or_says_why_not() {
 fn in_the_air(persona: &str, mode: &str) -> (Field, Value) {
     let mut field = Field::new("udpin:127.0.0.1:0", persona, "s5");
     let first = if persona == "ardupilot" { 1 } else { 0 };
+    let before = field.vehicle.dump()["mission"].take();
+    over_its_takeoff(&mut field, mode, first);
+    (field, before)
+}
+
+/// Puts a vehicle into the air over the first item of its mission.
+fn over_its_takeoff(field: &mut Field, mode: &str, first: usize) {
     let dump = field.vehicle.dump();
     let item = &dump["mission"]["items"][first];
     let degrees = |axis: &str| item[axis].as_f64().unwrap() / 1e7;
@@ -238,7 +245,6 @@ fn in_the_air(persona: &str, mode: &str) -> (Field, Value) {
     field.vehicle.control(&json!({
         "cmd": "set", "armed": true, "mode": mode, "current": first, "position": above
     }));
-    (field, dump["mission"].clone())
 }
 
 #[test]
@@ -276,6 +282,29 @@ fn in_flight_a_way_to_the_current_item_that_is_not_clear_is_refused_with_3() {
     assert_eq!(output.status.code(), Some(3), "{errors}");
     assert!(errors.contains("from where the vehicle is"), "{errors}");
     assert_eq!(field.vehicle.dump()["mission"]["items"], before["items"]);
+}
+
+#[test]
+fn in_flight_a_vehicle_that_has_moved_behind_an_obstacle_meanwhile_is_told_of() {
+    let state = tempfile::tempdir().unwrap();
+    let script = state.path().join("script");
+    // At the far end of s5, which is behind the obstacles.
+    let end = std::fs::read_to_string(example("s5")).unwrap();
+    let end: Value = serde_json::from_str(&end).unwrap();
+    let places = end["mission"]["items"].as_array().unwrap().iter().map(|item| &item["params"]);
+    let far = places.filter(|params| params[4].as_f64() > Some(0.0)).next_back().unwrap();
+    let moved = json!({
+        "on": "upload_ended", "cmd": "set", "position": [far[4], far[5], 500.0]
+    });
+    std::fs::write(&script, format!("{moved}\n")).unwrap();
+    let (plan, script) = (example("s5"), script.to_string_lossy().into_owned());
+    let arguments = ["--persona", "px4", "--mission", &plan, "--script", &script];
+    let mut field = Field { vehicle: FakeVehicle::start(&arguments), state };
+    over_its_takeoff(&mut field, "MISSION", 0);
+    let output = field.once(&["--in-flight"]);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{errors}");
+    assert!(errors.contains("the new mission is on the vehicle, but the way"), "{errors}");
 }
 
 #[test]
