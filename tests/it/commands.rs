@@ -291,8 +291,8 @@ fn in_flight_a_vehicle_that_has_moved_behind_an_obstacle_meanwhile_is_told_of() 
     // At the far end of s5, which is behind the obstacles.
     let end = std::fs::read_to_string(example("s5")).unwrap();
     let end: Value = serde_json::from_str(&end).unwrap();
-    let places = end["mission"]["items"].as_array().unwrap().iter().map(|item| &item["params"]);
-    let far = places.filter(|params| params[4].as_f64() > Some(0.0)).next_back().unwrap();
+    let mut places = end["mission"]["items"].as_array().unwrap().iter().map(|item| &item["params"]);
+    let far = places.rfind(|params| params[4].as_f64() > Some(0.0)).unwrap();
     let moved = json!({
         "on": "upload_ended", "cmd": "set", "position": [far[4], far[5], 500.0]
     });
