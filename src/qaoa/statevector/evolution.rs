@@ -78,7 +78,7 @@ impl<V: Vector> Evolution<V> {
     /// ⟨H⟩ after [`Self::run`].
     pub(super) fn energy(&self) -> f64 {
         let Self { layout, energies, low_vectors: low_energies, state, .. } = self;
-        let rows = state.re.par_chunks(layout.row).zip(state.im.par_chunks(layout.row));
+        let rows = state.plain_rows(layout);
         let sums = rows
             .enumerate()
             .map(|(row, state)| simd::run(Energy { energies, low_energies, layout, row, state }));
@@ -108,7 +108,7 @@ impl<V: Vector> Evolution<V> {
     fn histogram(&self, low: f64, high: f64) -> Vec<f64> {
         let Self { layout, energies, low_vectors, state, .. } = self;
         let scale = BINS as f64 / (high - low).max(f64::MIN_POSITIVE);
-        let rows = state.re.par_chunks(layout.row).zip(state.im.par_chunks(layout.row));
+        let rows = state.plain_rows(layout);
         let parts: Vec<Vec<f64>> = rows
             .enumerate()
             .map(|(row, (re, im))| {
@@ -167,7 +167,7 @@ impl<V: Vector> Evolution<V> {
 
     /// |amplitude|² of a basis state after [`Self::run`].
     pub(super) fn probability(&self, index: usize) -> f64 {
-        let (vector, lane) = (index / V::LANES, index % V::LANES);
+        let (vector, lane) = self.layout.place::<V>(index);
         self.state.re[vector].lane(lane).powi(2) + self.state.im[vector].lane(lane).powi(2)
     }
 }
