@@ -62,10 +62,18 @@ fn best<T>(mut run: impl FnMut() -> T) -> (Duration, T) {
     (0..5).map(|_| timed(&mut run)).min_by_key(|(time, _)| *time).unwrap()
 }
 
-fn row(what: &str, peer: &str, ours: Duration, own: &[f64], answer: &Answer, agree: f64) {
-    let off = own.iter().zip(&answer.energies).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    assert_eq!(own.len(), answer.energies.len());
-    assert!(off <= agree, "{what}: energies differ by {off:e}");
+/// How far energies may lie apart.
+const AGREE: f64 = 1e-6;
+
+fn apart(own: &[f64], theirs: &[f64]) -> f64 {
+    assert_eq!(own.len(), theirs.len());
+    own.iter().zip(theirs).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+/// One row of the table. `reference` is what the energies have to agree with.
+fn row(what: &str, peer: &str, ours: Duration, own: &[f64], answer: &Answer, reference: &[f64]) {
+    let off = apart(own, reference);
+    assert!(off <= AGREE, "{what}: energies differ by {off:e}");
     let theirs = answer.seconds;
     let ratio = theirs / ours.as_secs_f64();
     println!(
@@ -86,7 +94,9 @@ fn main() {
     let problem = three_regular(QUBITS);
     let angles = Angles::ramp(LAYERS);
     let mut versions = String::new();
-    for (single, name, agree) in [(false, "f64", 1e-6), (true, "f32", 1e-5)] {
+    // lightning's own energy in f32 is off by several times 1e-6, so f32 is held against its f64.
+    let mut double = Vec::new();
+    for (single, name) in [(false, "f64"), (true, "f32")] {
         let precision = if single { Precision::Single } else { Precision::Double };
         let mut engine = StatevectorEngine::new(&problem, precision, MEMORY).unwrap();
         let (time, (energy, _)) = best(|| engine.expectation_and_gradient(&angles).unwrap());
@@ -96,7 +106,13 @@ fn main() {
                 continue; // always double
             }
             let answer = ask(&python, &task(&problem, device, single, 0));
-            row(&what, device, time, &[energy], &answer, agree);
+            if single {
+                let off = apart(&answer.energies, &double);
+                println!("{device}'s energy in f32 is {off:.0e} off its own in f64");
+            } else {
+                double.clone_from(&answer.energies);
+            }
+            row(&what, device, time, &[energy], &answer, &double);
             versions = answer.versions;
         }
     }
@@ -108,6 +124,6 @@ fn main() {
         best(|| train(&mut engine, Angles::ramp(LAYERS), &settings, &Stop::new()).unwrap());
     let answer = ask(&python, &task(&problem.into(), "lightning.qubit", false, steps));
     let what = format!("chain, training of {steps} Adam steps, n=20 p=5");
-    row(&what, "lightning.qubit", time, &training.loss, &answer, 1e-6);
+    row(&what, "lightning.qubit", time, &training.loss, &answer, &answer.energies);
     println!("{versions}");
 }

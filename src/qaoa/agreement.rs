@@ -185,7 +185,7 @@ fn what_an_engine_cannot_do_is_an_error_with_the_figure() {
     let large = Ising::new(0.0, vec![1.0; 40], vec![]).unwrap();
     assert!(matches!(
         StatevectorEngine::new(&large, Precision::Double, MEMORY),
-        Err(EngineError::Memory { qubits: 40, needed: 35_184_388_866_048, .. })
+        Err(EngineError::Memory { qubits: 40, needed: 35_321_827_819_520, .. })
     ));
 }
 

@@ -161,37 +161,41 @@ pub(super) trait Kernel {
 pub(super) fn run<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
     {
-        if std::is_x86_feature_detected!("avx512f") && std::is_x86_feature_detected!("avx512vl") {
-            return x86::with_avx512(kernel);
+        if has_avx512() {
+            // SAFETY: the processor has just said that it has both.
+            #[allow(unsafe_code)]
+            return unsafe { x86::with_avx512(kernel) };
         }
         if std::is_x86_feature_detected!("avx2") {
-            return x86::with_avx2(kernel);
+            // SAFETY: the processor has just said that it has AVX2.
+            #[allow(unsafe_code)]
+            return unsafe { x86::with_avx2(kernel) };
         }
     }
     kernel.run()
 }
 
+/// Whether this processor has AVX-512 with vectors of all lengths.
 #[cfg(target_arch = "x86_64")]
-#[allow(unsafe_code)]
-mod x86 {
+pub(super) fn has_avx512() -> bool {
+    std::is_x86_feature_detected!("avx512f") && std::is_x86_feature_detected!("avx512vl")
+}
+
+/// Kernels compiled for some of the instruction sets of x86-64.
+#[cfg(target_arch = "x86_64")]
+pub(super) mod x86 {
     use super::Kernel;
 
-    pub(super) fn with_avx512<K: Kernel>(kernel: K) -> K::Output {
-        #[target_feature(enable = "avx512f,avx512vl")]
-        fn compiled<K: Kernel>(kernel: K) -> K::Output {
-            kernel.run()
-        }
-        // SAFETY: only called by `run`, after the processor has said that it has both.
-        unsafe { compiled(kernel) }
+    /// For AVX-512F and VL, which the processor must have.
+    #[target_feature(enable = "avx512f,avx512vl")]
+    pub(in super::super) fn with_avx512<K: Kernel>(kernel: K) -> K::Output {
+        kernel.run()
     }
 
-    pub(super) fn with_avx2<K: Kernel>(kernel: K) -> K::Output {
-        #[target_feature(enable = "avx2")]
-        fn compiled<K: Kernel>(kernel: K) -> K::Output {
-            kernel.run()
-        }
-        // SAFETY: only called by `run`, after the processor has said that it has AVX2.
-        unsafe { compiled(kernel) }
+    /// For AVX2, which the processor must have.
+    #[target_feature(enable = "avx2")]
+    pub(in super::super) fn with_avx2<K: Kernel>(kernel: K) -> K::Output {
+        kernel.run()
     }
 }
 

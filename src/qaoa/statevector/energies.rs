@@ -4,7 +4,7 @@
 //! the high bits make: two additions per amplitude instead of eight bytes of memory for each.
 
 use super::super::ising::Ising;
-use super::vector::Vector;
+use super::vector::{LANES, Vector};
 
 /// An Ising problem split into low and high qubits.
 #[derive(Debug, Clone)]
@@ -84,7 +84,7 @@ impl Energies {
     #[inline(always)]
     pub(super) fn fill<V: Vector>(&self, index: usize, low_energies: &[V], out: &mut [V]) {
         let Row { constant, fields } = self.row(index);
-        let within = V::LANES.trailing_zeros() as usize;
+        let within = LANES.trailing_zeros() as usize;
         out[0] = V::from_fn(|lane| {
             let inner: f64 =
                 fields[..within].iter().enumerate().map(|(bit, f)| f * z(lane, bit)).sum();

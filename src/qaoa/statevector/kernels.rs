@@ -6,7 +6,7 @@ use super::super::cvar::Tail;
 use super::super::simd::Kernel;
 use super::energies::{Energies, Row};
 use super::layout::{Columns, Layout, Part};
-use super::vector::Vector;
+use super::vector::{LANES, Vector};
 use super::walsh;
 
 /// `e^{−iγE}` over the low qubits alone; `e^{+iγE}` for a negative γ.
@@ -24,7 +24,7 @@ fn cis(angle: f64) -> (f64, f64) {
 
 impl<V: Vector> Phases<V> {
     pub(super) fn new(low_energies: &[f64], gamma: f64) -> Self {
-        let chunks = low_energies.chunks_exact(V::LANES);
+        let chunks = low_energies.chunks_exact(LANES);
         Self {
             gamma,
             re: chunks.clone().map(|e| V::from_fn(|lane| cis(-gamma * e[lane]).0)).collect(),
@@ -35,7 +35,7 @@ impl<V: Vector> Phases<V> {
     /// The phases that the high bits of a row add: doubled bit by bit.
     #[inline(always)]
     fn row(&self, row: &Row, (re, im): (&mut [V], &mut [V])) {
-        let within = V::LANES.trailing_zeros() as usize;
+        let within = LANES.trailing_zeros() as usize;
         let (inner, outer) = row.fields.split_at(within);
         let outer_sum: f64 = outer.iter().sum();
         let angle = |lane: usize| {
@@ -90,7 +90,7 @@ impl Mixer {
         let mut factors = Vec::with_capacity((layout.high + 1) * layout.width);
         for ones in 0..=layout.high {
             for vector in 0..layout.width {
-                let start = (column + vector) * V::LANES;
+                let start = (column + vector) * LANES;
                 let at = |lane: usize| self.by_ones[ones + (start + lane).count_ones() as usize];
                 factors.push((V::from_fn(|lane| at(lane).0), V::from_fn(|lane| at(lane).1)));
             }
@@ -218,7 +218,7 @@ fn flips<V: Vector>(
 ) -> f64 {
     let mut total = 0.0;
     for vector in 0..layout.width {
-        let start = (column + vector) * V::LANES;
+        let start = (column + vector) * LANES;
         let of_low = V::from_fn(|lane| {
             layout.qubits() as f64 - 2.0 * f64::from((start + lane).count_ones())
         });

@@ -4,12 +4,14 @@
 
 use rayon::prelude::*;
 
-use super::vector::Vector;
+use super::vector::{LANES, Vector};
 
 /// Groups of tiles that threads can take separately.
 const GROUPS: usize = 16;
 /// Vectors of a tile's row.
 const WIDTH: usize = 4;
+/// Vectors between rows.
+const PAD: usize = 4;
 
 /// Sizes of rows and tiles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,16 +22,26 @@ pub(super) struct Layout {
     pub(super) high: usize,
     /// Vectors of a row.
     pub(super) row: usize,
+    /// Vectors from one row to the next.
+    pub(super) stride: usize,
     /// Vectors of a tile's row.
     pub(super) width: usize,
 }
 
 impl Layout {
+    /// Number of amplitudes of the state of `qubits` as it lies in memory, [`u64::MAX`] if it can't.
+    pub(super) fn amplitudes(qubits: usize) -> u64 {
+        let Self { high, stride, .. } = Self::new(qubits);
+        let row = (stride * LANES) as u64;
+        1_u64.checked_shl(high as u32).map_or(u64::MAX, |rows| rows.saturating_mul(row))
+    }
+
     /// The layout for `qubits`, with dummy qubits on top if there are too few for whole vectors.
-    pub(super) fn new<V: Vector>(qubits: usize) -> Self {
-        let lanes = V::LANES.trailing_zeros() as usize;
+    pub(super) fn new(qubits: usize) -> Self {
+        let lanes = LANES.trailing_zeros() as usize;
         let low = (qubits / 2).clamp(11, 13);
-        Self { low, high: qubits.saturating_sub(low), row: 1 << (low - lanes), width: WIDTH }
+        let row = 1 << (low - lanes);
+        Self { low, high: qubits.saturating_sub(low), row, stride: row + PAD, width: WIDTH }
     }
 
     /// All qubits, dummies included.
@@ -40,6 +52,12 @@ impl Layout {
     /// Number of rows.
     pub(super) fn rows(&self) -> usize {
         1 << self.high
+    }
+
+    /// Vector and lane of an amplitude.
+    pub(super) fn place(&self, index: usize) -> (usize, usize) {
+        let vector = index / LANES;
+        (vector / self.row * self.stride + vector % self.row, index % LANES)
     }
 
     /// Vectors of a tile.
@@ -72,8 +90,8 @@ pub(super) struct Columns<'a, V> {
 impl<V: Vector> Amplitudes<V> {
     /// Makes room.
     pub(super) fn reserve(&mut self, layout: &Layout) {
-        self.re.resize(layout.row << layout.high, V::ZERO);
-        self.im.resize(layout.row << layout.high, V::ZERO);
+        self.re.resize(layout.stride << layout.high, V::ZERO);
+        self.im.resize(layout.stride << layout.high, V::ZERO);
     }
 
     /// All rows, for several threads.
@@ -81,8 +99,19 @@ impl<V: Vector> Amplitudes<V> {
         &mut self,
         layout: &Layout,
     ) -> impl IndexedParallelIterator<Item = Part<'_, V>> {
-        let parts = self.re.par_chunks_mut(layout.row).zip(self.im.par_chunks_mut(layout.row));
-        parts.map(|(re, im)| Part { re, im })
+        let (row, stride) = (layout.row, layout.stride);
+        let parts = self.re.par_chunks_mut(stride).zip(self.im.par_chunks_mut(stride));
+        parts.map(move |(re, im)| Part { re: &mut re[..row], im: &mut im[..row] })
+    }
+
+    /// All rows, to read.
+    pub(super) fn plain_rows(
+        &self,
+        layout: &Layout,
+    ) -> impl IndexedParallelIterator<Item = (&[V], &[V])> {
+        let (row, stride) = (layout.row, layout.stride);
+        let parts = self.re.par_chunks(stride).zip(self.im.par_chunks(stride));
+        parts.map(move |(re, im)| (&re[..row], &im[..row]))
     }
 
     /// All columns in groups, for several threads.
@@ -90,9 +119,12 @@ impl<V: Vector> Amplitudes<V> {
         let width = (layout.row / GROUPS).max(layout.width);
         let group = |group: usize| Columns { start: group * width, re: vec![], im: vec![] };
         let mut groups: Vec<_> = (0..layout.row / width).map(group).collect();
-        let rows = self.re.chunks_exact_mut(layout.row).zip(self.im.chunks_exact_mut(layout.row));
+        let rows =
+            self.re.chunks_exact_mut(layout.stride).zip(self.im.chunks_exact_mut(layout.stride));
         for (re, im) in rows {
-            let pieces = re.chunks_exact_mut(width).zip(im.chunks_exact_mut(width));
+            let pieces = re[..layout.row]
+                .chunks_exact_mut(width)
+                .zip(im[..layout.row].chunks_exact_mut(width));
             for (group, (re, im)) in groups.iter_mut().zip(pieces) {
                 group.re.push(re);
                 group.im.push(im);

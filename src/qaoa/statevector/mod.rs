@@ -23,8 +23,8 @@ use super::bits::Bits;
 use super::cvar::Tail;
 use super::engine::{Engine, EngineError, EngineKind, Sample};
 use super::ising::Ising;
-use evolution::Evolution;
-use vector::{D8, S8};
+use evolution::State;
+use layout::Layout;
 
 /// Rows and tiles in work on all threads.
 const WORKSPACE_BYTES: u64 = 16 << 20;
@@ -39,17 +39,11 @@ pub enum Precision {
     Single,
 }
 
-#[derive(Debug, Clone)]
-enum State {
-    Double(Evolution<D8>),
-    Single(Evolution<S8>),
-}
-
 /// The statevector engine with its problem and workspace.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct StatevectorEngine {
     qubits: usize,
-    state: State,
+    state: Box<dyn State>,
     /// The circuit whose final state is held.
     held: Option<Angles>,
 }
@@ -75,8 +69,8 @@ impl StatevectorEngine {
             });
         }
         let state = match precision {
-            Precision::Double => State::Double(Evolution::new(ising)),
-            Precision::Single => State::Single(Evolution::new(ising)),
+            Precision::Double => evolution::in_doubles(ising),
+            Precision::Single => evolution::in_singles(ising),
         };
         Ok(Self { qubits, state, held: None })
     }
@@ -84,38 +78,18 @@ impl StatevectorEngine {
     /// Bytes needed for `qubits`: the state and its adjoint, and a little for rows and tiles.
     #[must_use]
     pub fn memory(qubits: usize, precision: Precision) -> u64 {
-        let (amplitudes, bytes) = match precision {
-            Precision::Double => (Evolution::<D8>::amplitudes(qubits), 16),
-            Precision::Single => (Evolution::<S8>::amplitudes(qubits), 8),
+        let bytes = match precision {
+            Precision::Double => 16,
+            Precision::Single => 8,
         };
-        amplitudes.saturating_mul(2 * bytes).saturating_add(WORKSPACE_BYTES)
+        Layout::amplitudes(qubits).saturating_mul(2 * bytes).saturating_add(WORKSPACE_BYTES)
     }
 
     fn hold(&mut self, angles: &Angles) {
         if self.held.as_ref() != Some(angles) {
-            match &mut self.state {
-                State::Double(evolution) => evolution.run(angles),
-                State::Single(evolution) => evolution.run(angles),
-            }
+            self.state.run(angles);
             self.held = Some(angles.clone());
         }
-    }
-
-    /// The probability of one basis state of the held state, dummy qubits included.
-    fn basis_probability(&self, index: usize) -> f64 {
-        match &self.state {
-            State::Double(evolution) => evolution.probability(index),
-            State::Single(evolution) => evolution.probability(index),
-        }
-    }
-
-    /// Number of basis states, dummy qubits included.
-    fn basis_states(&self) -> usize {
-        let amplitudes = match self.state {
-            State::Double(_) => Evolution::<D8>::amplitudes(self.qubits),
-            State::Single(_) => Evolution::<S8>::amplitudes(self.qubits),
-        };
-        amplitudes as usize
     }
 }
 
@@ -130,18 +104,12 @@ impl Engine for StatevectorEngine {
 
     fn expectation(&mut self, angles: &Angles) -> Result<f64, EngineError> {
         self.hold(angles);
-        Ok(match &self.state {
-            State::Double(evolution) => evolution.energy(),
-            State::Single(evolution) => evolution.energy(),
-        })
+        Ok(self.state.energy())
     }
 
     fn expectation_and_gradient(&mut self, angles: &Angles) -> Result<(f64, Angles), EngineError> {
         self.held = None;
-        Ok(match &mut self.state {
-            State::Double(evolution) => evolution.gradient(angles, None),
-            State::Single(evolution) => evolution.gradient(angles, None),
-        })
+        Ok(self.state.gradient(angles, None))
     }
 
     fn cvar_and_gradient(
@@ -152,16 +120,10 @@ impl Engine for StatevectorEngine {
         _rng: &mut ChaCha8Rng,
     ) -> Result<(f64, Angles), EngineError> {
         self.hold(angles);
-        let quantile = match &self.state {
-            State::Double(evolution) => evolution.quantile(alpha),
-            State::Single(evolution) => evolution.quantile(alpha),
-        };
+        let quantile = self.state.quantile(alpha);
         self.held = None;
         let tail = Some(Tail { alpha, quantile });
-        Ok(match &mut self.state {
-            State::Double(evolution) => evolution.gradient(angles, tail),
-            State::Single(evolution) => evolution.gradient(angles, tail),
-        })
+        Ok(self.state.gradient(angles, tail))
     }
 
     fn cvar_is_exact(&self) -> bool {
@@ -178,14 +140,15 @@ impl Engine for StatevectorEngine {
         let mut draws: Vec<f64> = (0..shots).map(|_| rng.random()).collect();
         draws.sort_by(f64::total_cmp);
         // Rounding may leave the sum of all probabilities a little off 1.
-        let total: f64 = (0..self.basis_states()).map(|index| self.basis_probability(index)).sum();
+        let total: f64 =
+            (0..self.state.basis_states()).map(|index| self.state.probability(index)).sum();
         let mask = (1_usize << self.qubits) - 1;
         let mut counts = BTreeMap::new();
-        let (mut reached, mut index, mut likely) = (self.basis_probability(0), 0, 0);
+        let (mut reached, mut index, mut likely) = (self.state.probability(0), 0, 0);
         for draw in draws {
-            while reached <= draw * total && index + 1 < self.basis_states() {
+            while reached <= draw * total && index + 1 < self.state.basis_states() {
                 index += 1;
-                let probability = self.basis_probability(index);
+                let probability = self.state.probability(index);
                 reached += probability;
                 if probability > 0.0 {
                     likely = index;
@@ -204,7 +167,7 @@ impl Engine for StatevectorEngine {
         self.hold(angles);
         let index =
             bits.iter().enumerate().map(|(qubit, bit)| usize::from(bit) << qubit).sum::<usize>();
-        let dummies = self.basis_states() >> self.qubits;
-        Ok((0..dummies).map(|dummy| self.basis_probability(index | dummy << self.qubits)).sum())
+        let dummies = self.state.basis_states() >> self.qubits;
+        Ok((0..dummies).map(|dummy| self.state.probability(index | dummy << self.qubits)).sum())
     }
 }

@@ -1,7 +1,7 @@
 //! The Walsh–Hadamard transform of the bits of a block: sums and differences only. It makes the mixer
 //! `e^{−iβ ΣX}` diagonal, with eigenvalue `e^{−iβ(n − 2|k|)}` where |k| counts the ones of k.
 
-use super::vector::Vector;
+use super::vector::{LANES, Vector};
 
 /// Transforms the bits `stride` (in vectors) and up of a block.
 #[inline(always)]
@@ -101,8 +101,8 @@ pub(super) fn columns<V: Vector>(block: &mut [V], width: usize) {
 /// with the next higher ones.
 #[inline(always)]
 pub(super) fn forward<V: Vector>(block: &mut [V]) {
-    outer_bits(block, V::LANES);
-    for square in block.chunks_exact_mut(V::LANES) {
+    outer_bits(block, LANES);
+    for square in block.chunks_exact_mut(LANES) {
         transform_square(square);
     }
 }
@@ -110,10 +110,10 @@ pub(super) fn forward<V: Vector>(block: &mut [V]) {
 /// Transforms back (up to the factor 2^bits), the bits in their own places again.
 #[inline(always)]
 pub(super) fn backward<V: Vector>(block: &mut [V]) {
-    for square in block.chunks_exact_mut(V::LANES) {
+    for square in block.chunks_exact_mut(LANES) {
         transform_square(square);
     }
-    outer_bits(block, V::LANES);
+    outer_bits(block, LANES);
 }
 
 #[cfg(test)]
@@ -125,13 +125,13 @@ mod tests {
         let size = 1 << bits;
         let value = |index: usize| ((index * 37 + 11) % 101) as f64 - 50.0;
         let mut block: Vec<V> =
-            (0..size / V::LANES).map(|b| V::from_fn(|lane| value(b * V::LANES + lane))).collect();
+            (0..size / LANES).map(|b| V::from_fn(|lane| value(b * LANES + lane))).collect();
         forward(&mut block);
         for (b, vector) in block.iter().enumerate() {
-            for lane in 0..V::LANES {
+            for lane in 0..LANES {
                 // Undo the exchange of lane and row.
-                let (group, row) = (b / V::LANES, b % V::LANES);
-                let k = (group * V::LANES + lane) * V::LANES + row;
+                let (group, row) = (b / LANES, b % LANES);
+                let k = (group * LANES + lane) * LANES + row;
                 let sign =
                     |x: usize| if (k & x).count_ones().is_multiple_of(2) { 1.0 } else { -1.0 };
                 let expected: f64 = (0..size).map(|x| sign(x) * value(x)).sum();
@@ -140,8 +140,8 @@ mod tests {
         }
         backward(&mut block);
         for (b, vector) in block.iter().enumerate() {
-            for lane in 0..V::LANES {
-                assert_eq!(vector.lane(lane), size as f64 * value(b * V::LANES + lane));
+            for lane in 0..LANES {
+                assert_eq!(vector.lane(lane), size as f64 * value(b * LANES + lane));
             }
         }
     }

@@ -1,49 +1,16 @@
-//! [`Vector`]: eight numbers next to each other, in double or single precision, so that every kernel is
-//! written once.
+//! Eight numbers in plain Rust, for every processor.
 
 use std::ops::{Add, AddAssign, Mul, Sub};
 
-/// Eight numbers.
-pub(super) trait Vector:
-    Copy
-    + Default
-    + std::fmt::Debug
-    + Send
-    + Sync
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + AddAssign
-    + 'static
-{
-    /// How many.
-    const LANES: usize = 8;
-    /// All zero.
-    const ZERO: Self;
-
-    /// The same number in every lane.
-    fn splat(value: f64) -> Self;
-    /// One number per lane.
-    fn from_fn(value: impl FnMut(usize) -> f64) -> Self;
-    /// The number in one lane.
-    fn lane(self, lane: usize) -> f64;
-    /// The sum over all lanes.
-    fn sum(self) -> f64;
-    /// This vector's even numbers and the other's, then the odd ones of both, in pairs: the first step
-    /// of exchanging rows and columns.
-    fn by_ones(self, other: Self) -> (Self, Self);
-    /// The same for pairs of numbers.
-    fn by_twos(self, other: Self) -> (Self, Self);
-    /// The same for halves.
-    fn by_fours(self, other: Self) -> (Self, Self);
-}
+use super::super::super::simd::Kernel;
+use super::Vector;
 
 macro_rules! eight_lanes {
     ($name:ident, $scalar:ty, $align:literal, $doc:literal) => {
         #[doc = $doc]
         #[derive(Debug, Clone, Copy, PartialEq, Default)]
         #[repr(align($align))]
-        pub(super) struct $name([$scalar; 8]);
+        pub(in super::super) struct $name([$scalar; 8]);
 
         eight_lanes!(operator $name, Add, add, +);
         eight_lanes!(operator $name, Sub, sub, -);
@@ -58,6 +25,11 @@ macro_rules! eight_lanes {
 
         impl Vector for $name {
             const ZERO: Self = Self([0.0; 8]);
+
+            #[inline(always)]
+            fn run<K: Kernel>(kernel: K) -> K::Output {
+                kernel.run()
+            }
 
             #[inline(always)]
             fn splat(value: f64) -> Self {
