@@ -80,6 +80,8 @@ pub struct ScenarioResult {
     pub legs: usize,
     /// Their straight lines, metres.
     pub straight_m: f64,
+    /// The obstacles that they are flown over or under, near enough to be in the way otherwise.
+    pub flown_over_or_under: Vec<String>,
     /// A row for each method.
     pub methods: Vec<Measured>,
     /// What the paper reports for the scenario of this name; its maps are not published.
@@ -134,7 +136,8 @@ pub fn run(args: &CompareArgs, shown: &Shown) -> Result<String, CliError> {
             return Err(FileError::NoMission(path.clone()).into());
         }
         shown.warn(&scenario.warnings);
-        let tasks = legs::legs_to_plan(&scenario, &options)?;
+        let (tasks, warnings) = legs::legs_to_plan(&scenario, &options)?;
+        shown.warn(&warnings);
         if tasks.is_empty() {
             let path = path.display();
             return Err(CliError::Usage(format!(
@@ -150,6 +153,7 @@ pub fn run(args: &CompareArgs, shown: &Shown) -> Result<String, CliError> {
         scenarios.push(ScenarioResult {
             legs: tasks.len(),
             straight_m: tasks.iter().map(LegTask::straight).sum::<Metres>().0,
+            flown_over_or_under: flown_over_or_under(&tasks),
             methods,
             paper: paper_lengths(&name).map(PaperFigures::from),
             name,
@@ -185,6 +189,17 @@ fn command(args: &CompareArgs, options: &Options) -> String {
         args.edges,
         reproduce::arguments(options)
     )
+}
+
+/// Each obstacle once.
+fn flown_over_or_under(tasks: &[LegTask]) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for name in tasks.iter().flat_map(|task| &task.passed) {
+        if !names.contains(name) {
+            names.push(name.clone());
+        }
+    }
+    names
 }
 
 fn name(path: &Path) -> String {

@@ -27,7 +27,8 @@ use std::fmt;
 
 use super::Options;
 use super::reason::ReplanError;
-use crate::fence::{HeightRange, HeightReference, Limit, Limits};
+use crate::airspace::RegionId;
+use crate::fence::{FenceRegion, FenceRole, FenceSet, HeightRange, HeightReference, Limit, Limits};
 use crate::mission::altitude::{Altitude, AltitudeReference};
 use crate::mission::commands::{Destination, Role};
 use crate::mission::legs::{LegKind, LegShape, number};
@@ -232,6 +233,16 @@ impl Altitudes {
         let over = heights.top.is_some_and(|top| low >= top.0 + margin);
         let under = heights.bottom.is_some_and(|bottom| high <= bottom.0 - margin);
         if over || under { Passage::Clear } else { Passage::TooNear }
+    }
+
+    /// The obstacles that a leg is clear of by its altitudes, rising.
+    pub(super) fn cleared(&self, leg: &Leg, fences: &FenceSet) -> Vec<RegionId> {
+        let clear = |region: &FenceRegion| {
+            region.role == FenceRole::Exclusion
+                && region.heights.is_some_and(|heights| self.compare(leg, &heights).is_clear())
+        };
+        let regions = (0..).map(RegionId).zip(&fences.regions);
+        regions.filter(|(_, region)| clear(region)).map(|(id, _)| id).collect()
     }
 
     /// The altitudes of a leg as heights above what a region is measured from.

@@ -9,7 +9,7 @@ use super::altitudes::Altitudes;
 use super::reason::ReplanError;
 use super::{Input, Options};
 use crate::airspace::{Airspace, AirspaceError, Outline, RegionId};
-use crate::fence::{FenceRegion, FenceRole, FenceSet};
+use crate::fence::{FenceRegion, FenceSet};
 use crate::geodesy::{LatLon, LocalFrame, ProjectionError, Xy, Zone};
 use crate::mission::Leg;
 use crate::planner::leg_space::LegSpace;
@@ -139,14 +139,7 @@ impl<'a> Fields<'a> {
 
     /// The obstacles that a leg is clear of by its altitudes, rising.
     fn cleared(&self, leg: &Leg) -> Vec<RegionId> {
-        let regions = (0..).map(RegionId).zip(&self.fences.regions);
-        let clear = |(_, region): &(RegionId, &FenceRegion)| {
-            region.role == FenceRole::Exclusion
-                && region
-                    .heights
-                    .is_some_and(|heights| self.altitudes.compare(leg, &heights).is_clear())
-        };
-        regions.filter(clear).map(|(id, _)| id).collect()
+        self.altitudes.cleared(leg, self.fences)
     }
 
     /// The airspace as a leg meets it that [`Fields::new`] was given.
@@ -191,6 +184,19 @@ impl<'a> Fields<'a> {
             })
             .collect()
     }
+}
+
+/// The obstacles that a leg of the mission is clear of by its altitudes, rising: planning leaves
+/// them out of its airspace.
+///
+/// # Errors
+/// As [`super::judge()`].
+pub fn cleared(
+    leg: &Leg,
+    input: &Input<'_>,
+    options: &Options,
+) -> Result<Vec<RegionId>, ReplanError> {
+    Ok(Altitudes::of(input.mission, options)?.cleared(leg, input.fences))
 }
 
 fn zone_of(leg: &Leg, forced: Option<Zone>) -> Zone {

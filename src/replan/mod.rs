@@ -27,7 +27,7 @@ use crate::planner::Settings;
 
 pub use altitudes::Vertical;
 pub use fewer::{replan, replan_with};
-pub use field::{Field, FieldError};
+pub use field::{Field, FieldError, cleared};
 pub use judge::{LegVerdict, Verdict, fields, judge};
 pub use plan::{LegRecord, Progress, Replanned, Stage};
 pub use reason::ReplanError;

@@ -3,7 +3,8 @@
 use super::run::Run;
 use super::stretch::stretches;
 use super::text::{
-    Table, best_gap, change, clearance, count, duration, finding, leg_label, push_wrapped, unbroken,
+    Table, best_gap, change, clearance, count, duration, finding, leg_label, named, push_wrapped,
+    unbroken,
 };
 use crate::qaoa::qpu::QpuUse;
 use crate::replan::{LegRecord, LegVerdict, Replanned, Verdict};
@@ -68,19 +69,12 @@ pub fn plan_summary(result: &Replanned, run: &Run<'_>) -> String {
 
 /// The legs that are flown over or under something.
 fn heights(out: &mut String, verdict: &Verdict) {
-    /// Obstacles named per leg.
-    const NAMED: usize = 3;
     for (k, leg) in verdict.legs.iter().filter(|leg| !leg.passed.is_empty()).enumerate() {
         if k == 0 {
             out.push('\n');
         }
-        let named = leg.passed.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
-        let more = match leg.passed.len().saturating_sub(NAMED) {
-            0 => String::new(),
-            more => format!(" and {more} more"),
-        };
-        let name = leg.leg.name();
-        let clear = format!("The {name} is clear of {named}{more} by its altitude.");
+        let (name, named) = (leg.leg.name(), named(&leg.passed));
+        let clear = format!("The {name} is clear of {named} by its altitude.");
         push_wrapped(out, &clear, 4);
     }
 }

@@ -22,7 +22,7 @@ pub(super) fn plain(text: &str) -> String {
 
 /// Appends a paragraph broken into lines of [`WIDTH`]; lines after the first are indented. A word
 /// that is longer than a line is broken as well, a number stays with its unit ([`UNBROKEN`]).
-pub(super) fn push_wrapped(out: &mut String, text: &str, indent: usize) {
+pub(crate) fn push_wrapped(out: &mut String, text: &str, indent: usize) {
     let mut width = 0;
     for word in plain(text).split_ascii_whitespace() {
         let mut letters: Vec<char> =
@@ -91,6 +91,16 @@ pub(super) fn duration(time: Duration) -> String {
 /// A count with its noun.
 pub(super) fn count(number: usize, noun: &str) -> String {
     format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
+}
+
+/// The first of some names, and how many there are more.
+pub(crate) fn named(names: &[String]) -> String {
+    const NAMED: usize = 3;
+    let first = names.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
+    match names.len().saturating_sub(NAMED) {
+        0 => first,
+        more => format!("{first} and {more} more"),
+    }
 }
 
 /// A leg in a table's cell: items as ground stations count them.

@@ -10,7 +10,7 @@ use crate::formats::Scenario;
 use crate::geodesy::{LatLon, LocalFrame, ProjectionError, Xy, Zone, geodesic_distance};
 use crate::mission::legs::{LegKind, LegShape};
 use crate::planner::leg_space::LegSpace;
-use crate::replan::{FieldError, Input, Options, ReplanError, judge};
+use crate::replan::{FieldError, Input, LegVerdict, Options, ReplanError, cleared, judge};
 use crate::units::Metres;
 
 /// A leg to plan, from place to place: circles that are flown at its ends are no part of the
@@ -25,6 +25,9 @@ pub struct LegTask {
     pub ends: (Xy, Xy),
     /// The frame that all methods plan in.
     pub frame: LocalFrame,
+    /// The obstacles near its straight line that it is flown over or under.
+    pub passed: Vec<String>,
+    /// Without all that it is flown over or under.
     airspace: Airspace,
     /// Local metres per ground metre at the most.
     spread: f64,
@@ -32,17 +35,19 @@ pub struct LegTask {
 
 impl LegTask {
     fn new(
-        from: LatLon,
-        to: LatLon,
-        scenario: &Scenario,
+        verdict: &LegVerdict,
+        input: &Input<'_>,
         options: &Options,
-    ) -> Result<Self, FieldError> {
+    ) -> Result<Self, ReplanError> {
+        let (from, to) = (verdict.leg.from.position, verdict.leg.to.position);
         let zone = options.zone.unwrap_or_else(|| Zone::of_leg(from, to));
         let frame = LocalFrame::new(zone, from)?;
-        let airspace = Airspace::new(&scenario.fences, &frame, options.inclusion)?;
+        let airspace = Airspace::new(input.fences, &frame, options.inclusion)
+            .map_err(FieldError::from)?
+            .without(&cleared(&verdict.leg, input, options)?);
         let spread = frame.scale_spread([&from, &to])?;
         let ends = (frame.to_local(from)?, frame.to_local(to)?);
-        Ok(Self { from, to, ends, frame, airspace, spread })
+        Ok(Self { from, to, ends, frame, passed: verdict.passed.clone(), airspace, spread })
     }
 
     /// The airspace with a buffer in ground metres.
@@ -75,11 +80,15 @@ impl LegTask {
     }
 }
 
-/// The legs of a scenario's mission that come too near to something and can be given waypoints.
+/// The legs of a scenario's mission that come too near to something and can be given waypoints,
+/// and what was assumed or odd, a sentence each.
 ///
 /// # Errors
 /// [`CliError::Usage`] where the mission or a region cannot be used.
-pub fn legs_to_plan(scenario: &Scenario, options: &Options) -> Result<Vec<LegTask>, CliError> {
+pub fn legs_to_plan(
+    scenario: &Scenario,
+    options: &Options,
+) -> Result<(Vec<LegTask>, Vec<String>), CliError> {
     let rally = rally_places(&scenario.rally)?;
     let input = Input {
         mission: &scenario.mission,
@@ -90,15 +99,14 @@ pub fn legs_to_plan(scenario: &Scenario, options: &Options) -> Result<Vec<LegTas
     };
     let verdict = judge(&input, options)?;
     let mut seen = BTreeSet::new();
-    let tasks: Result<Vec<LegTask>, FieldError> = verdict
+    let tasks: Result<Vec<LegTask>, ReplanError> = verdict
         .legs
         .iter()
         .filter(|verdict| verdict.blocker.is_some())
-        .map(|verdict| &verdict.leg)
-        .filter(|leg| leg.shape == LegShape::Straight)
-        .filter(|leg| matches!(leg.kind, LegKind::Flown | LegKind::Return(_)))
-        .filter(|leg| leg.insert_before.is_some_and(|place| seen.insert(place)))
-        .map(|leg| LegTask::new(leg.from.position, leg.to.position, scenario, options))
+        .filter(|verdict| verdict.leg.shape == LegShape::Straight)
+        .filter(|verdict| matches!(verdict.leg.kind, LegKind::Flown | LegKind::Return(_)))
+        .filter(|verdict| verdict.leg.insert_before.is_some_and(|place| seen.insert(place)))
+        .map(|verdict| LegTask::new(verdict, &input, options))
         .collect();
-    Ok(tasks.map_err(ReplanError::from)?)
+    Ok((tasks?, verdict.warnings))
 }

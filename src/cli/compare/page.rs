@@ -34,6 +34,10 @@ pub fn comparison_page(comparison: &Comparison, command: &str) -> String {
     if !reasons.is_empty() {
         content += &section("Where no path was found", &reasons);
     }
+    let passed = passed(comparison);
+    if !passed.is_empty() {
+        content += &section("Flown over or under, and so in nobody's way", &passed);
+    }
     let curves = picture::loss_curves(&comparison.scenarios);
     content += &section("Training", &format!("<div class=\"charts\">{curves}</div>\n"));
     if !comparison.growth.is_empty() {
@@ -111,6 +115,17 @@ fn reasons(comparison: &Comparison) -> String {
         }
     }
     if rows.is_empty() { String::new() } else { table("", &["scenario", "method", "why"], &rows) }
+}
+
+/// The obstacles that do not count, by their heights.
+fn passed(comparison: &Comparison) -> String {
+    let mut rows = Vec::new();
+    for scenario in &comparison.scenarios {
+        for obstacle in &scenario.flown_over_or_under {
+            rows.push(vec![scenario.name.clone(), obstacle.clone()]);
+        }
+    }
+    if rows.is_empty() { String::new() } else { table("", &["scenario", "obstacle"], &rows) }
 }
 
 fn growth(growth: &Growth) -> String {

@@ -139,7 +139,16 @@ mod tests {
             rounds: vec![round],
         };
         let methods = vec![quav];
-        ScenarioResult { name: name.into(), legs: 1, straight_m: 90.0, methods, paper: None }
+        let flown_over_or_under = Vec::new();
+        let name = name.into();
+        ScenarioResult {
+            name,
+            legs: 1,
+            straight_m: 90.0,
+            flown_over_or_under,
+            methods,
+            paper: None,
+        }
     }
 
     /// The curves' points, as in the picture.

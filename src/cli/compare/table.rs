@@ -3,6 +3,7 @@
 use super::growth::{Grower, Growth};
 use super::measure::{Measured, Method};
 use super::{Comparison, PaperFigures, ScenarioResult};
+use crate::report::text::{named, push_wrapped};
 
 /// Width of a line's first column, and of each of the others.
 const LABEL: usize = 20;
@@ -35,6 +36,13 @@ pub fn text(comparison: &Comparison) -> String {
                 out.push_str(&shortened(&line, 80));
                 out.push('\n');
             }
+        }
+    }
+    for ScenarioResult { name, flown_over_or_under, .. } in &comparison.scenarios {
+        if !flown_over_or_under.is_empty() {
+            let named = named(flown_over_or_under);
+            let told = format!("{name}: flown over or under, and so in nobody's way: {named}");
+            push_wrapped(&mut out, &told, 4);
         }
     }
     if comparison.scenarios.iter().any(|scenario| scenario.paper.is_some()) {
@@ -186,6 +194,7 @@ mod tests {
             name: (*name).to_owned(),
             legs: 1,
             straight_m: 123_456.78,
+            flown_over_or_under: (0..9).map(|k| format!("{name} building {k}")).collect(),
             methods: Method::ALL
                 .map(|method| measured(method, (method != Method::Rrt).then_some(123_456.78)))
                 .into(),
