@@ -268,6 +268,10 @@ impl Placemark {
                 self.altitude_mode = None;
                 self.shapes.push(Shape::Polygon { outer, holes });
             }
+            // The mode is that of one geometry, also where several stand in a placemark.
+            (_, "Point" | "LineString" | "LinearRing") if !within("Polygon") => {
+                self.altitude_mode = None;
+            }
             _ => {}
         }
         Ok(())

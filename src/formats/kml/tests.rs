@@ -1,5 +1,6 @@
-use crate::fence::FenceRole;
+use crate::fence::{FenceRole, HeightRange, HeightReference};
 use crate::formats::{Scenario, read_scenario};
+use crate::units::Metres;
 
 const RING: &str = "8,47,0 8.01,47,0\n 8.01,47.01,0 8,47,0";
 
@@ -112,4 +113,77 @@ fn broken_geometry_is_an_error_that_names_the_placemark() {
 fn deep_nesting_is_refused_without_recursion() {
     let error = error_of(&format!("<kml>{}", "<Folder>".repeat(100_000)));
     assert!(error.contains("more than 256 XML elements"), "{error}");
+}
+
+/// A polygon with this mode whose vertices have these altitudes.
+fn tall(mode: &str, altitudes: [&str; 3]) -> String {
+    let [a, b, c] = altitudes;
+    let ring = format!("8,47{a} 8.01,47{b} 8.01,47.01{c} 8,47{a}");
+    let mode = match mode {
+        "" => String::new(),
+        mode => format!("<altitudeMode>{mode}</altitudeMode>"),
+    };
+    polygon(&ring).replace("<Polygon>", &format!("<Polygon><extrude>1</extrude>{mode}"))
+}
+
+fn heights_of(content: &str) -> Option<HeightRange> {
+    read(&format!("<Placemark>{content}</Placemark>")).fences.regions[0].heights
+}
+
+fn up_to(reference: HeightReference, top: f64) -> Option<HeightRange> {
+    Some(HeightRange { reference, bottom: None, top: Some(Metres(top)) })
+}
+
+#[test]
+fn a_polygon_reaches_as_high_as_its_highest_vertex_above_what_its_mode_says() {
+    let (ground, amsl) = (HeightReference::Ground, HeightReference::MeanSeaLevel);
+    let heights = |mode| heights_of(&tall(mode, [",30", ",42.5", ",30"]));
+    assert_eq!(heights("relativeToGround"), up_to(ground, 42.5));
+    assert_eq!(heights("absolute"), up_to(amsl, 42.5));
+    // Google Earth writes altitudes also where its mode makes nothing of them.
+    for clamped in ["", "clampToGround", "clampToSeaFloor", "relativeToSeaFloor", "odd"] {
+        assert_eq!(heights(clamped), None, "{clamped}");
+    }
+    // Two parts of one placemark: the higher.
+    let two = |one: &str, other: &str| {
+        let geometry = tall(one, [",10", ",10", ",10"]) + &tall(other, [",20", ",20", ",20"]);
+        heights_of(&format!("<MultiGeometry>{geometry}</MultiGeometry>"))
+    };
+    assert_eq!(two("absolute", "absolute"), up_to(amsl, 20.0));
+    assert_eq!(two("relativeToGround", "absolute"), None);
+    assert_eq!(two("absolute", ""), None);
+}
+
+#[test]
+fn what_is_not_given_for_every_vertex_is_not_known() {
+    for altitudes in [["", "", ""], [",30", "", ",30"], [",30", ",0", ",30"], [",30", ",-2", ",30"]]
+    {
+        assert_eq!(heights_of(&tall("relativeToGround", altitudes)), None, "{altitudes:?}");
+    }
+    // What is said in words counts more than what is drawn.
+    let said = "<ExtendedData><Data name='height'><value>12</value></Data></ExtendedData>";
+    let drawn = tall("absolute", [",30", ",30", ",30"]);
+    assert_eq!(heights_of(&(said.to_owned() + &drawn)), up_to(HeightReference::Ground, 12.0));
+}
+
+#[test]
+fn the_mode_of_one_geometry_is_not_that_of_the_next() {
+    let mode = "<altitudeMode>absolute</altitudeMode>";
+    let clamped = tall("", [",30", ",30", ",30"]);
+    for before in [
+        format!("<Point>{mode}<coordinates>8,47,5</coordinates></Point>"),
+        format!("<LineString>{mode}<coordinates>8,47,5 9,47,5</coordinates></LineString>"),
+    ] {
+        let both = format!("<MultiGeometry>{before}{clamped}</MultiGeometry>");
+        assert_eq!(heights_of(&both), None, "{before}");
+    }
+    let ring = |mode: &str| {
+        format!(
+            "<LinearRing>{mode}<coordinates>8,47,9 8.1,47,9 8.1,47.1,9</coordinates></LinearRing>"
+        )
+    };
+    let two =
+        |second: &str| format!("<MultiGeometry>{}{}</MultiGeometry>", ring(mode), ring(second));
+    assert_eq!(heights_of(&two(mode)), up_to(HeightReference::MeanSeaLevel, 9.0));
+    assert_eq!(heights_of(&two("")), None);
 }

@@ -36,7 +36,8 @@ struct Entry {
 pub(super) enum Written<'a> {
     /// One item, with the object that it was read from.
     Simple(usize, Option<&'a Properties>),
-    /// A complex item that stands for so many items from an index on.
+    /// A complex item that stands for so many items from an index on; a survey that nobody has
+    /// drawn yet stands for none.
     Complex(usize, usize, &'a Properties),
 }
 
@@ -72,24 +73,33 @@ impl KeptPlan {
     pub(super) fn entries(&self, now: &[MissionItem]) -> Vec<Written<'_>> {
         let mut simple = vec![None; now.len()];
         let mut complex = vec![None; now.len()];
+        // Those that stand for nothing, with the index that they stand before.
+        let mut empty = Vec::new();
+        let mut next = 0;
         for (entry, found) in self.located(now) {
-            match found {
-                Some(first) if entry.is_complex() => {
-                    if let Some(slot) = complex.get_mut(first) {
-                        *slot = Some(entry);
-                    }
+            if entry.items.is_empty() {
+                empty.push((next, &entry.object));
+            }
+            let Some(first) = found else { continue };
+            next = first + entry.items.len();
+            if entry.is_complex() {
+                if let Some(slot) = complex.get_mut(first) {
+                    *slot = Some(entry);
                 }
-                Some(first) => {
-                    if let Some(slot) = simple.get_mut(first) {
-                        *slot = Some(&entry.object);
-                    }
-                }
-                None => {}
+            } else if let Some(slot) = simple.get_mut(first) {
+                *slot = Some(&entry.object);
             }
         }
+        let mut empty = empty.into_iter().peekable();
         let mut written = Vec::new();
         let mut index = 0;
-        while index < now.len() {
+        loop {
+            while let Some((_, object)) = empty.next_if(|(before, _)| *before <= index) {
+                written.push(Written::Complex(index, 0, object));
+            }
+            if index >= now.len() {
+                return written;
+            }
             if let Some(entry) = complex[index] {
                 written.push(Written::Complex(index, entry.items.len(), &entry.object));
                 index += entry.items.len();
@@ -98,7 +108,6 @@ impl KeptPlan {
                 index += 1;
             }
         }
-        written
     }
 
     /// The complex items that `now` does not hold as they were: their place in the list, from 1,

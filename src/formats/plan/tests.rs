@@ -1,3 +1,4 @@
+use proptest::prelude::*;
 use serde_json::{Value, json};
 
 use crate::formats::{Scenario, plan_flattened, read_scenario, write_plan};
@@ -209,6 +210,31 @@ fn a_complex_item_with_a_new_waypoint_inside_is_written_flat_and_said_so() {
 }
 
 #[test]
+fn a_complex_item_that_stands_for_nothing_yet_is_kept_in_its_place() {
+    let empty = json!({ "type": "ComplexItem", "complexItemType": "survey", "version": 5,
+        "polygon": [], "TransectStyleComplexItem": { "version": 2, "Items": [] } });
+    let list = json!([empty, waypoint(1), empty, empty, survey(2), waypoint(4), empty]);
+    let mut scenario = read(&list);
+    assert_eq!(scenario.mission.items.len(), 4);
+    let kinds = |scenario: &Scenario| -> String {
+        let letter = |item: &Value| match item["complexItemType"].as_str() {
+            None => 'w',
+            Some(_) if item["TransectStyleComplexItem"]["Items"] == json!([]) => 'e',
+            Some(_) => 's',
+        };
+        written_items(scenario).iter().map(letter).collect()
+    };
+    assert_eq!(kinds(&scenario), "eweeswe");
+    let mut new = scenario.mission.items[0];
+    (new.x, new.y) = (1, 2);
+    scenario.mission.items.insert(1, new);
+    assert_eq!(kinds(&scenario), "eweewswe");
+    assert!(plan_flattened(&scenario).is_empty());
+    // And where nothing else is flown.
+    assert_eq!(kinds(&read(&json!([empty]))), "e");
+}
+
+#[test]
 fn a_landing_pattern_stays_one() {
     let landing = json!({ "type": "ComplexItem", "complexItemType": "vtolLandingPattern",
         "version": 1, "altitudesAreRelative": true, "landCoordinate": [47.0, 8.0, 0],
@@ -238,5 +264,90 @@ fn what_quavd_does_not_know_of_a_plan_is_kept() {
     let written = &again["mission"]["items"][0];
     for key in ["AltitudeMode", "AMSLAltAboveTerrain", "Altitude", "something"] {
         assert_eq!(written[key], item[key], "{key}");
+    }
+}
+
+/// A corridor scan as QGroundControl 4 writes it, shortened.
+fn corridor(first_id: u32, items: u32) -> Value {
+    let items: Vec<Value> = (first_id..first_id + items).map(waypoint).collect();
+    json!({ "type": "ComplexItem", "complexItemType": "CorridorScan", "version": 2,
+        "CorridorWidth": 50, "EntryPoint": 0, "polyline": [[47, 8], [47, 8.1]],
+        "TransectStyleComplexItem": { "version": 2, "HoverAndCapture": false, "Items": items } })
+}
+
+fn landing(kind: &str) -> Value {
+    json!({ "type": "ComplexItem", "complexItemType": kind, "version": 2,
+        "altitudesAreRelative": true, "landCoordinate": [47.0, 8.0, 0],
+        "landingApproachCoordinate": [47.01, 8.0, 40], "loiterClockwise": true,
+        "loiterRadius": 75, "stopTakingPhotos": true, "stopTakingVideo": false,
+        "useLoiterToAlt": true })
+}
+
+/// Lists of items with `doJumpId`s as QGroundControl counts them; the last item may jump to any.
+fn lists() -> impl Strategy<Value = Value> {
+    let kinds = prop::collection::vec((0..5u32, 0..4u32), 0..8);
+    (kinds, prop::option::of(any::<prop::sample::Index>())).prop_map(|(kinds, target)| {
+        let mut next = 1;
+        let mut list = Vec::new();
+        for (kind, items) in kinds {
+            let (entry, flown) = match kind {
+                0 => (survey(next), 2),
+                1 => (corridor(next, items), items),
+                2 => (landing("fwLandingPattern"), 5),
+                3 => (landing("vtolLandingPattern"), 5),
+                _ => (waypoint(next), 1),
+            };
+            list.push(entry);
+            next += flown;
+        }
+        if let Some(target) = target.filter(|_| next > 1) {
+            list.push(jump(next, 1 + target.index(next as usize - 1) as u32));
+        }
+        Value::Array(list)
+    })
+}
+
+proptest! {
+    #[test]
+    fn complex_items_that_are_read_are_written_as_they_were(list in lists()) {
+        let scenario = read(&list);
+        let written = written_items(&scenario);
+        let list = list.as_array().unwrap();
+        prop_assert_eq!(written.len(), list.len());
+        for (written, read) in written.iter().zip(list) {
+            if read["type"] == "ComplexItem" {
+                prop_assert_eq!(written, read);
+            }
+        }
+        let text = write_plan(&scenario).unwrap();
+        let again = read_scenario("a.plan", text.as_bytes()).unwrap();
+        prop_assert_eq!(format!("{:?}", again.mission), format!("{:?}", scenario.mission));
+        prop_assert_eq!(write_plan(&again).unwrap(), text);
+    }
+
+    #[test]
+    fn with_a_new_waypoint_anywhere_what_is_written_is_what_is_flown(
+        list in lists(), at in any::<prop::sample::Index>(),
+    ) {
+        let mut scenario = read(&list);
+        let items = &mut scenario.mission.items;
+        let at = at.index(items.len() + 1);
+        let mut new = read(&json!([waypoint(1)])).mission.items[0];
+        (new.x, new.y) = (1, 2);
+        items.insert(at, new);
+        for (seq, item) in items.iter_mut().enumerate() {
+            item.seq = seq as u16;
+            if item.command == Command::DO_JUMP && item.params[0] as usize >= at {
+                item.params[0] += 1.0;
+            }
+        }
+        let text = write_plan(&scenario).unwrap();
+        let again = read_scenario("a.plan", text.as_bytes()).unwrap();
+        prop_assert_eq!(format!("{:?}", again.mission), format!("{:?}", scenario.mission));
+        let complex = |list: &[Value]| list.iter().filter(|i| i["type"] == "ComplexItem").count();
+        let flattened = plan_flattened(&scenario).len();
+        prop_assert!(flattened <= 1);
+        let written = complex(&written_items(&scenario));
+        prop_assert_eq!(written + flattened, complex(list.as_array().unwrap()));
     }
 }
