@@ -10,24 +10,26 @@ PACKAGES := cmake g++ make pkg-config sqlite3 libsqlite3-dev python3-venv system
 TOOLS := target/tools
 
 .PHONY: all build demo ibm-demo faults deb test-deb soak companions daemon-figures test test-rust test-python test-ibm lint doc \
-	bench bench-table bench-peers bench-link bench-ibm fuzz examples gallery reference clean system
+	bench bench-table bench-peers bench-link bench-ibm fuzz examples gallery reference clean system browser
 
 all: build
+
+# Followed by the packages.
+INSTALL = sudo=; [ "$$(id -u)" = 0 ] || sudo=sudo; $$sudo apt-get update -qq && \
+	DEBIAN_FRONTEND=noninteractive $$sudo apt-get install -y -qq --no-install-recommends
 
 # PROJ is built from source and wants cmake and sqlite3; the tests want a venv.
 system:
 	@for tool in cmake g++ pkg-config sqlite3 systemd-analyze; do command -v $$tool >/dev/null || missing=1; done; \
 	test -e /usr/include/sqlite3.h || missing=1; \
-	if [ -n "$$missing" ]; then \
-		sudo=; [ "$$(id -u)" = 0 ] || sudo=sudo; \
-		$$sudo apt-get update -qq && \
-		DEBIAN_FRONTEND=noninteractive $$sudo apt-get install -y -qq --no-install-recommends $(PACKAGES); \
-	fi
+	if [ -n "$$missing" ]; then $(INSTALL) $(PACKAGES); fi
+
+# The tests load the reports in it.
+browser:
+	@command -v chromium >/dev/null || command -v google-chrome >/dev/null || { $(INSTALL) chromium; }
 
 $(VENV)/.ready: sitl/requirements.txt sitl/requirements-alone.txt
-	$(PYTHON) -c 'import ensurepip' 2>/dev/null || { \
-		sudo=; [ "$$(id -u)" = 0 ] || sudo=sudo; \
-		$$sudo apt-get update -qq && $$sudo apt-get install -y -qq python3-venv; }
+	$(PYTHON) -c 'import ensurepip' 2>/dev/null || { $(INSTALL) python3-venv; }
 	$(PYTHON) -m venv $(VENV)
 	$(VENV)/bin/pip install --quiet --disable-pip-version-check -r sitl/requirements.txt
 	$(VENV)/bin/pip install --quiet --disable-pip-version-check --no-deps -r sitl/requirements-alone.txt
@@ -86,7 +88,7 @@ daemon-figures: build $(VENV)/.ready
 test: test-rust test-python test-ibm
 
 # One runner where there is one; plain cargo test does the same.
-test-rust: system $(VENV)/.ready $(VENV_IBM)/.ready
+test-rust: system browser $(VENV)/.ready $(VENV_IBM)/.ready
 	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
 		QUAV_PYTHON=$(CURDIR)/$(VENV)/bin/python QUAV_IBM_PYTHON=$(CURDIR)/$(VENV_IBM)/bin/python $(CARGO) nextest run --release --locked; \
 	else \
@@ -97,8 +99,10 @@ test-rust: system $(VENV)/.ready $(VENV_IBM)/.ready
 test-python: $(VENV)/.ready
 	cd sitl && MAVLINK20=1 ../$(VENV)/bin/python -m unittest
 
-# What needs qiskit is in a folder of its own, which the unittest above does not look into.
-test-ibm: build $(VENV_IBM)/.ready
+# What needs qiskit is in a folder of its own, which the unittest above does not look into. The program
+# is the one of test-rust: without tests beside it, it has dependencies with other features, built anew.
+test-ibm: system $(VENV_IBM)/.ready
+	$(CARGO) build --release --locked --bins --tests
 	cd sitl && QUAVD=$(abspath $(BIN)) ../$(VENV_IBM)/bin/python -m unittest discover -s ibm
 
 # The six scenarios on a stand-in of ibm_kyiv with its recorded errors, and a training on it. Some minutes.

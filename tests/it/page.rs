@@ -1,5 +1,5 @@
-//! The HTML report in a browser, where there is one: headless Chromium must load it without an
-//! error on the console, in both colour schemes and on a phone, and the map must react.
+//! The HTML report in a browser: headless Chromium must load it without an error on the console, in
+//! both colour schemes and on a phone, and the map must react.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -8,13 +8,14 @@ fn example(name: &str) -> String {
     format!("{}/fence_examples/{name}.plan", env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Chromium, where this machine has one. CI installs it; see `.ci/run`.
-fn chromium() -> Option<PathBuf> {
-    let path = std::env::var_os("PATH")?;
-    let mut names = ["chromium", "chromium-browser", "google-chrome"].into_iter();
-    names.find_map(|name| {
+/// Chromium, which `make test` installs.
+fn chromium() -> PathBuf {
+    let path = std::env::var_os("PATH").unwrap();
+    let mut names = ["chromium", "google-chrome"].into_iter();
+    let found = names.find_map(|name| {
         std::env::split_paths(&path).map(|folder| folder.join(name)).find(|file| file.exists())
-    })
+    });
+    found.expect("no Chromium: install the package chromium, or run `make test`, which does")
 }
 
 fn report(directory: &Path, name: &str, more: &[&str]) -> PathBuf {
@@ -53,10 +54,7 @@ fn loaded(browser: &Path, page: &Path, script: &str, more: &[&str]) -> (String, 
 
 #[test]
 fn a_report_loads_without_an_error_and_reacts() {
-    let Some(browser) = chromium() else {
-        println!("skipped: no Chromium on this machine; install the package chromium");
-        return;
-    };
+    let browser = chromium();
     let directory = tempfile::tempdir().unwrap();
     let page = report(directory.path(), "s3", &[]);
     let size = page.metadata().unwrap().len();
@@ -90,10 +88,7 @@ fn a_report_loads_without_an_error_and_reacts() {
 
 #[test]
 fn the_report_of_a_mission_without_a_plan_loads_too() {
-    let Some(browser) = chromium() else {
-        println!("skipped: no Chromium on this machine; install the package chromium");
-        return;
-    };
+    let browser = chromium();
     let directory = tempfile::tempdir().unwrap();
     let page = report(directory.path(), "infeasible", &[]);
     let (document, console) = loaded(&browser, &page, "", &["--window-size=400,800"]);
@@ -116,10 +111,7 @@ fn a_comparison_is_a_page_with_the_papers_figures_and_the_curves() {
     for part in ["A* in the paper", "447.08", "<polyline", "--seeds 1 --edges 20 --buffer 5"] {
         assert!(text.contains(part), "{part}");
     }
-    let Some(browser) = chromium() else {
-        println!("not loaded: no Chromium on this machine; install the package chromium");
-        return;
-    };
+    let browser = chromium();
     let (document, console) = loaded(&browser, &page, "", &["--window-size=400,800"]);
     assert_eq!(console, "");
     assert!(document.contains("id=\"save\""));
