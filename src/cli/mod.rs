@@ -101,17 +101,19 @@ pub fn run(cli: Cli) -> ExitCode {
 /// Logs go to stderr, never to stdout. A daemon that systemd has started logs to the journal, with
 /// fields, and tells what happens without being asked to.
 fn start_log(verbose: u8, quiet: bool, is_daemon: bool) {
+    use tracing::level_filters::LevelFilter;
+    use tracing_subscriber::filter::Targets;
     use tracing_subscriber::layer::SubscriberExt;
     use tracing_subscriber::util::SubscriberInitExt;
 
     let level = match (quiet, verbose + u8::from(is_daemon)) {
-        (true, _) => "error",
-        (_, 0) => "warn",
-        (_, 1) => "info",
-        _ => "debug",
+        (true, _) => LevelFilter::ERROR,
+        (_, 0) => LevelFilter::WARN,
+        (_, 1) => LevelFilter::INFO,
+        _ => LevelFilter::DEBUG,
     };
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
-        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new(format!("quav={level}")));
+    let asked = std::env::var("RUST_LOG").ok().and_then(|text| text.parse::<Targets>().ok());
+    let filter = asked.unwrap_or_else(|| Targets::new().with_target("quav", level));
     // systemd sets JOURNAL_STREAM; without a journal socket stderr is as good as it gets.
     let journal = std::env::var_os("JOURNAL_STREAM")
         .filter(|_| is_daemon)
