@@ -216,6 +216,10 @@ mod tests {
         for line in text.lines() {
             assert!(line.chars().count() <= 80, "{line}");
         }
+        let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        let told = "s1: flown over or under, and so in nobody's way: s1 building 0, s1 building 1, \
+                    s1 building 2 and 6 more";
+        assert!(words.contains(told), "{text}");
     }
 
     #[test]
