@@ -87,10 +87,12 @@ daemon-figures: build $(VENV)/.ready
 
 test: test-rust test-python test-ibm
 
-# One runner where there is one; plain cargo test does the same.
+# One runner where there is one; plain cargo test does the same. Most tests wait for a fake vehicle most of
+# the time: two of them for each processor.
 test-rust: system browser $(VENV)/.ready $(VENV_IBM)/.ready
 	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
-		QUAV_PYTHON=$(CURDIR)/$(VENV)/bin/python QUAV_IBM_PYTHON=$(CURDIR)/$(VENV_IBM)/bin/python $(CARGO) nextest run --release --locked; \
+		QUAV_PYTHON=$(CURDIR)/$(VENV)/bin/python QUAV_IBM_PYTHON=$(CURDIR)/$(VENV_IBM)/bin/python $(CARGO) nextest run --release --locked \
+			--test-threads $$(($$(nproc) * 2)); \
 	else \
 		QUAV_PYTHON=$(CURDIR)/$(VENV)/bin/python QUAV_IBM_PYTHON=$(CURDIR)/$(VENV_IBM)/bin/python $(CARGO) test --release --locked; \
 	fi

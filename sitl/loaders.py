@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""What other people's programs make of a file: their loaders' view of it, as one JSON document.
+"""What other people's programs make of files: their loaders' view of each, as one JSON document.
 
-    loaders.py mission FILE      pymavlink's mavwp and MAVProxy's wp module
-    loaders.py fence FILE        the same of a fence: items, polygons, circles, return point
-    loaders.py rally FILE        the same of rally points
-    loaders.py plan FILE...      a QGroundControl .plan against the schema of its documentation
+    loaders.py mission FILE...   pymavlink's mavwp and MAVProxy's wp module
+    loaders.py fence FILE...     the same of fences: items, polygons, circles, return point
+    loaders.py rally FILE...     the same of rally points
+    loaders.py plan FILE...      QGroundControl's .plan against the schema of its documentation
 
 Nothing of quavd is used. The MAVProxy modules are the real ones, with a stand-in for the program
 around them; what they would upload is what is printed. Exit status 1: a loader refused the file.
@@ -103,10 +103,15 @@ def main(arguments):
     kind, *paths = arguments
     # The loaders print on stdout what they have to say; the document stands alone there.
     out, sys.stdout = sys.stdout, sys.stderr
-    seen = check_plans(paths) if kind == "plan" else view(kind, paths[0])
+    if kind == "plan":
+        seen = check_plans(paths)
+        failed = bool(seen["problems"])
+    else:
+        seen = [view(kind, path) for path in paths]
+        failed = False
     json.dump(seen, out)
     out.write("\n")
-    sys.exit(1 if seen.get("problems") else 0)
+    sys.exit(1 if failed else 0)
 
 
 if __name__ == "__main__":

@@ -29,8 +29,8 @@ fn load(path: &Path) -> Scenario {
     read_scenario(name, &std::fs::read(path).unwrap()).unwrap()
 }
 
-/// What the loaders make of a file.
-fn seen(kind: &str, files: &[&Path]) -> Value {
+/// What the loaders make of files: one program for all of them, as it takes a while to start.
+fn seen(kind: &str, files: &[PathBuf]) -> Value {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("sitl/loaders.py");
     let output = Command::new(python()).arg(script).arg(kind).args(files).output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
@@ -95,52 +95,58 @@ fn in_file(scenario: &Scenario) -> Vec<MissionItem> {
 #[test]
 fn waypoint_files_open_in_mavwp_and_mavproxy_with_every_item() {
     let directory = tempfile::tempdir().unwrap();
-    let mut missions = 0;
-    for example in examples() {
-        let scenario = load(&example);
-        if scenario.mission.items.is_empty() {
-            continue;
-        }
-        let path =
-            write(&directory, "mission.waypoints", &write_waypoints(&scenario.mission).unwrap());
-        let seen = seen("mission", &[&path]);
+    let scenarios: Vec<_> =
+        examples().iter().map(|example| (example.clone(), load(example))).collect();
+    let missions: Vec<_> =
+        scenarios.iter().filter(|(_, scenario)| !scenario.mission.items.is_empty()).collect();
+    let written = |(number, (_, scenario)): (usize, &&(PathBuf, Scenario))| {
+        let text = write_waypoints(&scenario.mission).unwrap();
+        write(&directory, &format!("{number}.waypoints"), &text)
+    };
+    let files: Vec<PathBuf> = missions.iter().enumerate().map(written).collect();
+    let seen = seen("mission", &files);
+    for (number, (example, scenario)) in missions.iter().enumerate() {
         for loader in ["mavwp", "mavproxy"] {
-            let items = Value::Array(seen[loader].as_array().unwrap()[1..].to_vec());
-            assert_items(
-                &items,
-                &in_file(&scenario),
-                &format!("{} in {loader}", example.display()),
-            );
+            let items = Value::Array(seen[number][loader].as_array().unwrap()[1..].to_vec());
+            let context = format!("{} in {loader}", example.display());
+            assert_items(&items, &in_file(scenario), &context);
         }
-        missions += 1;
     }
-    assert!(missions > 10);
+    assert!(missions.len() > 10);
 }
 
 #[test]
 fn fences_open_in_mavwp_and_mavproxy_with_every_region() {
     let directory = tempfile::tempdir().unwrap();
-    let (mut fences, mut old) = (0, 0);
-    for example in examples() {
-        let scenario = load(&example);
+    // Each file with what is in it, and whether it is old text.
+    let mut files = Vec::new();
+    let mut expected = Vec::new();
+    for (number, example) in examples().iter().enumerate() {
+        let scenario = load(example);
         if scenario.fences.regions.is_empty() {
             continue;
         }
         let context = example.display().to_string();
-        let path = write(&directory, "a.fence", &write_waypoints_fence(&scenario.fences).unwrap());
-        let view = seen("fence", &[&path]);
-        let expected = encode_fence(&scenario.fences).unwrap();
-        assert_items(&view["mavwp"], &expected, &context);
-        assert_items(&view["mavproxy"], &expected, &context);
-        assert_regions(&view["regions"], &scenario, &context);
-        fences += 1;
+        let text = write_waypoints_fence(&scenario.fences).unwrap();
+        files.push(write(&directory, &format!("{number}.fence"), &text));
+        expected.push((scenario.clone(), context.clone(), false));
         if let Ok(text) = write_fence_text(&scenario.fences) {
-            let path = write(&directory, "a.fen", &text);
-            let view = seen("fence", &[&path]);
-            assert_regions(&view["regions"], &scenario, &format!("{context} as old text"));
-            old += 1;
+            files.push(write(&directory, &format!("{number}.fen"), &text));
+            expected.push((scenario, format!("{context} as old text"), true));
         }
     }
+    let seen = seen("fence", &files);
+    for (number, (scenario, context, is_old)) in expected.iter().enumerate() {
+        let view = &seen[number];
+        if !is_old {
+            let items = encode_fence(&scenario.fences).unwrap();
+            assert_items(&view["mavwp"], &items, context);
+            assert_items(&view["mavproxy"], &items, context);
+        }
+        assert_regions(&view["regions"], scenario, context);
+    }
+    let old = expected.iter().filter(|(.., is_old)| *is_old).count();
+    let fences = expected.len() - old;
     assert!(fences > 15 && old > 0, "{fences} fences, {old} as old text");
 }
 
@@ -194,9 +200,9 @@ fn rally_points_open_in_mavwp_and_mavproxy() {
             continue;
         }
         let path = write(&directory, "a.rally", &write_waypoints_rally(&scenario.rally));
-        let seen = seen("rally", &[&path]);
+        let seen = seen("rally", &[path]);
         for loader in ["mavwp", "mavproxy"] {
-            assert_items(&seen[loader], &scenario.rally, &example.display().to_string());
+            assert_items(&seen[0][loader], &scenario.rally, &example.display().to_string());
         }
         files += 1;
     }
@@ -211,7 +217,6 @@ fn plans_are_what_qgroundcontrols_documentation_says() {
         let text = write_plan(&load(example)).unwrap();
         written.push(write(&directory, &format!("{number}.plan"), &text));
     }
-    let written: Vec<&Path> = written.iter().map(PathBuf::as_path).collect();
     let seen = seen("plan", &written);
     assert_eq!(seen["problems"], json!([]));
     assert_eq!(seen["files"], written.len());
