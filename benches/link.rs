@@ -15,8 +15,8 @@
 //!
 //! Heartbeats and telemetry share the line and are not part of the bound: they count against the
 //! ratio, as do all waits. On a machine that does other things as well, quavd and the vehicle also
-//! wait for a processor; how long is said (Linux's `schedstat`, summed over all threads of both), and
-//! so is the ratio without that time. Environment: `QUAV_BENCH_ITEMS` (200), `QUAV_BENCH_LOSSY_RUNS` (100).
+//! wait for a processor. How long is said (Linux's `schedstat`, summed over all threads of both), but
+//! it cannot be taken off: a part of it passes while the line is busy anyhow. Environment: `QUAV_BENCH_ITEMS` (200), `QUAV_BENCH_LOSSY_RUNS` (100).
 
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::print_stdout)]
 #![allow(dead_code)] // of the tests' fake vehicle, of which only a part is needed here
@@ -86,6 +86,8 @@ fn ahead(items: &[MissionItem]) -> usize {
 }
 
 fn file(items: &[MissionItem]) -> usize {
+    // Where zeros end a frame they are not sent: of the offset of the first reads three bytes, of the
+    // header's count and of the file's length one and two.
     let frame = |size: usize, is_read: bool| {
         let mut data = [1; FileTransfer::MOST_DATA];
         data[size..].fill(0);
@@ -97,19 +99,20 @@ fn file(items: &[MissionItem]) -> usize {
             opcode,
             size: size as u8,
             req_opcode: 0,
-            offset: u32::MAX,
+            offset: if is_read { 1 } else { u32::MAX },
             data,
         })
     };
     let body = items.len() * 38;
     let (whole, rest) = (body / FileTransfer::MOST_DATA, body % FileTransfer::MOST_DATA);
-    let header = frame(0, true) + frame(10, false) + frame(0, true);
+    let header = frame(0, true) + frame(9, false) + frame(0, true);
     let path = "@MISSION/mission.dat".len();
     header
         + whole * frame(FileTransfer::MOST_DATA, false)
         + frame(rest, false)
         + 2 * frame(path, false)
-        + 2 * frame(4, false)
+        + frame(2, false)
+        + frame(4, false)
 }
 
 /// How long the threads of a process have been ready to run without a processor.
@@ -163,9 +166,8 @@ fn report(what: &str, bytes: usize, took: Took) {
     let (all, waiting) = (took.all.as_secs_f64(), took.waiting.as_secs_f64());
     println!(
         "{what:<38} {bytes:>6} bytes, at least {bound:>6.3} s, took {all:>6.3} s: {:>5.1} %; \
-         {waiting:>5.3} s of it without a processor: {:>5.1} %",
-        100.0 * bound / all,
-        100.0 * bound / (all - waiting)
+         threads waited {waiting:.1} s for a processor",
+        100.0 * bound / all
     );
 }
 

@@ -204,7 +204,7 @@ pub async fn find(link: &Link, search: &Search) -> Result<Vehicle, DiscoveryErro
 
     let (send, state) = watch::channel(VehicleState::new(heartbeat, received.at));
     let monitor = tokio::spawn(follow(link.clone(), link.subscribe()?, node, send));
-    let version = ask_version(link, &mut inbox, node, &search.timing).await?;
+    let version = ask_version(link, &mut inbox, node, autopilot, &search.timing).await?;
     let (capabilities, uid) = version.map_or((None, None), |(it, uid)| (Some(it), uid));
     Ok(Vehicle {
         link: link.clone(),
@@ -266,16 +266,21 @@ fn autopilot_heartbeat(received: &Received) -> Option<Heartbeat> {
 }
 
 /// Asks for AUTOPILOT_VERSION. `None` where the vehicle does not say: not an error, since some
-/// never do and the protocol itself will show.
+/// never do and the protocol itself will show. ArduPilot and PX4 do, and by their number alone an
+/// emptied vehicle is told from another one, so that they are asked longer on a bad line.
 async fn ask_version(
     link: &Link,
     inbox: &mut Inbox,
     vehicle: Node,
+    autopilot: Autopilot,
     timing: &Timing,
 ) -> Result<Option<(Capabilities, Option<Uid>)>, LinkError> {
-    const TRIES: u32 = 2;
+    let tries = match autopilot {
+        Autopilot::ArduPilot | Autopilot::Px4 => 6,
+        Autopilot::Other(_) => 2,
+    };
     let params = [AUTOPILOT_VERSION_DATA::ID as f32, 0.0];
-    for _ in 0..TRIES {
+    for _ in 0..tries {
         link.send(&command(vehicle, MavCmd::MAV_CMD_REQUEST_MESSAGE, params)).await?;
         let deadline = Instant::now() + timing.request;
         while let Ok(received) = timeout_at(deadline, inbox.next()).await {

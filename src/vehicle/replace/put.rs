@@ -45,12 +45,19 @@ impl Putting<'_> {
         let mut is_begun = self.what == What::Old;
         let mut unproven = false;
         loop {
+            let mut ours = Vec::from([&self.record.intended]);
             let error = match self.upload(on_step).await {
                 Ok(uploaded) => match (uploaded, self.prove(on_step).await) {
-                    (Uploaded::Unconfirmed, Err(mismatch @ Obstacle::Mismatch { .. }))
-                        if !unproven =>
+                    // There is nothing to fall back on when the old plan is put back: where the
+                    // vehicle has just made something else of it, it gets it once more.
+                    (_, Err(mismatch @ Obstacle::Mismatch { .. }))
+                        if !unproven
+                            && (uploaded == Uploaded::Unconfirmed || self.what == What::Old) =>
                     {
                         (unproven, is_begun) = (true, true);
+                        if uploaded == Uploaded::Acknowledged {
+                            ours.push(&self.record.before);
+                        }
                         mismatch
                     }
                     (_, proof) => return self.proven_again(proof?, on_step).await,
@@ -78,7 +85,7 @@ impl Putting<'_> {
             };
             let plan = self.record.mission_type;
             tracing::warn!(%plan, %error, "upload to be begun again");
-            self.nobody_else_was_here(is_begun, on_step).await?;
+            self.nobody_else_was_here(is_begun, &ours, on_step).await?;
         }
     }
 
@@ -123,18 +130,24 @@ impl Putting<'_> {
         self.prove(on_step).await
     }
 
-    /// Whether the plan on the vehicle is still one that may be overwritten.
+    /// Whether the plan on the vehicle is still one that may be overwritten: once an upload has been
+    /// begun, also what it can have made of the plans that are `ours`.
     async fn nobody_else_was_here(
         &self,
         is_begun: bool,
+        ours: &[&Vec<MissionItem>],
         on_step: OnStep<'_>,
     ) -> Result<(), Obstacle> {
         let Record { mission_type, before, .. } = self.record;
         let held = held(self.vehicle, *mission_type, on_step).await?;
         let mut changed = changes(self.vehicle.autopilot(), *mission_type, before, &held);
         let may_go_on = if is_begun {
-            let found = finding(&self.vehicle.id(), self.record, &held, Suspect::Ourselves);
-            found != Finding::SomebodyElses
+            let is_ours = |plan: &&Vec<MissionItem>| {
+                let record = Record { intended: (*plan).clone(), ..self.record.clone() };
+                let found = finding(&self.vehicle.id(), &record, &held, Suspect::Ourselves);
+                found != Finding::SomebodyElses
+            };
+            ours.iter().any(is_ours)
         } else {
             changed.is_empty()
         };

@@ -118,12 +118,10 @@ pub(super) fn finding(
     let home_slot = usize::from(home_slot(autopilot, mission_type));
     let ours = match suspect {
         Suspect::Ourselves => true,
-        // An empty plan tells nothing: it may be another vehicle, or somebody has cleared it. Only
-        // a fence is known to vanish by itself, and that of ArduPilot only.
+        // An empty plan tells nothing where it may be another vehicle's. On the same one, ArduPilot
+        // has erased the fence or cut the mission; PX4 does neither, so that somebody has cleared it.
         Suspect::Anybody if held.len() <= home_slot => {
-            mission_type == MissionType::Fence
-                && autopilot == Autopilot::ArduPilot
-                && vehicle.is(&record.vehicle)
+            autopilot == Autopilot::ArduPilot && vehicle.is(&record.vehicle)
         }
         Suspect::Anybody => true,
     };
@@ -255,11 +253,17 @@ mod tests {
     #[test]
     fn an_empty_plan_is_put_back_only_where_it_is_known_to_be_our_doing() {
         assert_eq!(found(&[], Suspect::Ourselves), Finding::Mixture);
-        assert_eq!(found(&[0], Suspect::Anybody), Finding::SomebodyElses);
-        assert_eq!(found(&[], Suspect::Anybody), Finding::SomebodyElses);
-        let fence = record(MissionType::Fence);
-        let empty = |vehicle| finding(&vehicle, &fence, &[], Suspect::Anybody);
-        assert_eq!(empty(vehicle(5)), Finding::Mixture, "ArduPilot erases some");
-        assert_eq!(empty(vehicle(0)), Finding::SomebodyElses, "who is that?");
+        assert_eq!(found(&[0], Suspect::Anybody), Finding::Mixture, "cut by a failed upload");
+        for plan in [MissionType::Mission, MissionType::Fence] {
+            let mut record = record(plan);
+            let empty = |record: &Record, vehicle: VehicleId| {
+                finding(&vehicle, record, &[], Suspect::Anybody)
+            };
+            assert_eq!(empty(&record, vehicle(5)), Finding::Mixture, "ArduPilot erases some");
+            assert_eq!(empty(&record, vehicle(0)), Finding::SomebodyElses, "who is that?");
+            record.vehicle.autopilot = Autopilot::Px4;
+            let px4 = VehicleId { autopilot: Autopilot::Px4, ..vehicle(5) };
+            assert_eq!(empty(&record, px4), Finding::SomebodyElses, "cleared by somebody");
+        }
     }
 }

@@ -145,9 +145,12 @@ impl Run {
         }
         if rng.random_bool(0.08) {
             // What spoils an upload would spoil theirs, which is then their own loss.
-            const SPOILERS: [&str; 4] = ["reboot", "refusal", "half-write", "mis-store"];
+            const SPOILERS: [&str; 5] =
+                ["reboot", "refusal", "half-write", "mis-store", "vanishing fence"];
             faults.retain(|(kind, _)| !SPOILERS.contains(kind));
             let (at, count) = (rng.random_range(0.0..2.0), rng.random_range(1..6));
+            // ArduPilot erases a fence of one or two circles.
+            let count = if mission_type == MissionType::Fence { count + 2 } else { count };
             faults.push((
                 "ground station",
                 format!("second-gcs:at={at:.2},type={name},count={count},pace=20"),
