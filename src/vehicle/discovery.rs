@@ -215,6 +215,7 @@ pub async fn find(link: &Link, search: &Search) -> Result<Vehicle, DiscoveryErro
         state,
         monitor,
         timing: search.timing.clone(),
+        lacked: std::sync::Mutex::default(),
         transfer: Mutex::new(()),
     })
 }

@@ -23,6 +23,7 @@ pub mod timing;
 pub mod transfer;
 pub mod upload;
 
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 use tokio::sync::{Mutex, watch};
@@ -37,6 +38,7 @@ pub use state::{Position, VehicleState};
 pub use timing::Timing;
 pub use transfer::{MissionResult, Progress, TransferError};
 
+use crate::link::message::ParamName;
 use crate::link::{Link, LinkError, Node};
 
 /// One vehicle on a link. Transfers take `&self` and run one at a time.
@@ -49,6 +51,8 @@ pub struct Vehicle {
     state: watch::Receiver<VehicleState>,
     monitor: JoinHandle<LinkError>,
     timing: Timing,
+    /// Parameters that it was found not to have.
+    lacked: std::sync::Mutex<BTreeSet<ParamName>>,
     /// Held by the transfer that runs.
     transfer: Mutex<()>,
 }

@@ -3,9 +3,11 @@
 //! Most autopilots do not answer a question for a name that they do not know, and on a bad link
 //! they do not seem to answer for one that they do know either. So with every round of questions
 //! goes one that each vehicle can answer, for its first parameter: how often that one comes back
-//! tells how much the silence about a name is worth.
+//! tells how much the silence about a name is worth. What a vehicle was found not to have costs
+//! that time once: from then on it is asked for with the others, and they alone are waited for.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{MutexGuard, PoisonError};
 use std::time::Duration;
 
 use tokio::time::{Instant, timeout_at};
@@ -112,9 +114,33 @@ impl Vehicle {
             })
             .collect::<Result<_, _>>()?;
         let inbox = self.link.subscribe()?;
-        let mut reading = Reading { vehicle: self, inbox, known: BTreeMap::new(), proofs: 0 };
+        // What it did not have before is asked for, and not waited for once the others have come.
+        let doubtful = self.doubtful(&names);
+        let mut reading =
+            Reading { vehicle: self, inbox, known: BTreeMap::new(), doubtful, proofs: 0 };
         reading.run(&names).await?;
+        let mut lacked = self.lacked();
+        for name in &names {
+            match reading.known.get(name).copied().flatten() {
+                Some(_) => lacked.remove(name),
+                None => lacked.insert(*name),
+            };
+        }
         Ok(names.iter().map(|name| reading.known.get(name).copied().flatten()).collect())
+    }
+
+    /// Those of the names that it was found not to have, where there are others to be waited for.
+    fn doubtful(&self, names: &[ParamName]) -> BTreeSet<ParamName> {
+        let lacked = self.lacked();
+        if names.iter().all(|name| lacked.contains(name)) {
+            return BTreeSet::new();
+        }
+        let doubtful = names.iter().filter(|&name| lacked.contains(name)).copied();
+        doubtful.take(MOST_AT_ONCE / 2).collect()
+    }
+
+    fn lacked(&self) -> MutexGuard<'_, BTreeSet<ParamName>> {
+        self.lacked.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -124,6 +150,8 @@ struct Reading<'a> {
     inbox: Inbox,
     /// What is settled.
     known: BTreeMap<ParamName, Option<ParameterValue>>,
+    /// What the vehicle did not have when it was asked before.
+    doubtful: BTreeSet<ParamName>,
     /// Rounds in which the question that each vehicle can answer was answered.
     proofs: u32,
 }
@@ -137,19 +165,27 @@ impl Reading<'_> {
         loop {
             let mut open: Vec<ParamName> = Vec::new();
             for &name in names {
-                if !self.known.contains_key(&name) && !open.contains(&name) {
+                let is_settled = self.known.contains_key(&name) || self.doubtful.contains(&name);
+                if !is_settled && !open.contains(&name) {
                     open.push(name);
                 }
             }
             // Those that were asked for least come first.
             open.sort_by_key(|name| asked.get(name).copied().unwrap_or(0));
-            open.truncate(MOST_AT_ONCE);
+            open.truncate(MOST_AT_ONCE - self.doubtful.len());
             let Some(&first) = open.first() else { return Ok(()) };
             let patience = self.vehicle.timing.patience;
             let is_gone = self.vehicle.silent_for() >= patience;
             if rounds > 0 && (is_gone || began.elapsed() >= 2 * patience) {
                 let waited = began.elapsed();
                 return Err(ParameterError::NoAnswer { name: first, waited });
+            }
+            if rounds == 0 {
+                // Answers come in the order of the questions: with the last of the others, these
+                // are there as well.
+                for &name in &self.doubtful {
+                    self.ask(-1, name).await?;
+                }
             }
             for &name in &open {
                 self.ask(-1, name).await?;
@@ -181,7 +217,7 @@ impl Reading<'_> {
                     proven = true;
                     self.proofs += 1;
                 }
-                if open.contains(&value.name) {
+                if open.contains(&value.name) || self.doubtful.contains(&value.name) {
                     let read = value_of(&value, self.vehicle.copies_bytes())?;
                     self.known.insert(value.name, Some(read));
                 }

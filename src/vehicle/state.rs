@@ -18,8 +18,13 @@ use crate::mission::Home;
 /// How often to see whether the streams we asked for are coming, and ask again: an autopilot
 /// forgets them when it restarts.
 const ASK_AGAIN: Duration = Duration::from_secs(3);
-/// One message a second is enough for planning on the ground.
-const STREAM_INTERVAL: Duration = Duration::from_secs(1);
+/// The streams that are wanted. Once a second is enough for planning on the ground; MISSION_CURRENT
+/// tells that there is another plan, which somebody waits to see answered.
+const STREAMS: [(u32, Duration); 3] = [
+    (HOME_POSITION_DATA::ID, Duration::from_secs(1)),
+    (GLOBAL_POSITION_INT_DATA::ID, Duration::from_secs(1)),
+    (MissionCurrent::ID, Duration::from_millis(500)),
+];
 
 /// The latest known state of a vehicle.
 #[derive(Debug, Clone, PartialEq)]
@@ -126,11 +131,11 @@ pub(super) async fn follow(
                 Err(error) => return error,
             },
             _ = ask.tick() => {
-                for message_id in streams.missing() {
+                for (message_id, interval) in streams.missing() {
                     let request = command(
                         vehicle,
                         MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL,
-                        [message_id as f32, STREAM_INTERVAL.as_micros() as f32],
+                        [message_id as f32, interval.as_micros() as f32],
                     );
                     if let Err(error) = link.send(&request).await {
                         return error;
@@ -144,23 +149,25 @@ pub(super) async fn follow(
 /// Which of the wanted streams came since they were last looked at.
 #[derive(Default)]
 struct Streams {
-    heard: [bool; 3],
+    heard: [bool; STREAMS.len()],
 }
 
 impl Streams {
-    const WANTED: [u32; 3] =
-        [HOME_POSITION_DATA::ID, GLOBAL_POSITION_INT_DATA::ID, MissionCurrent::ID];
-
     fn heard(&mut self, message_id: u32) {
-        if let Some(k) = Self::WANTED.iter().position(|&wanted| wanted == message_id) {
+        if let Some(k) = STREAMS.iter().position(|(wanted, _)| *wanted == message_id) {
             self.heard[k] = true;
         }
     }
 
     /// Those that did not come, counted anew from now on.
-    fn missing(&mut self) -> Vec<u32> {
+    fn missing(&mut self) -> Vec<(u32, Duration)> {
         let heard = std::mem::take(&mut self.heard);
-        Self::WANTED.into_iter().zip(heard).filter(|(_, heard)| !heard).map(|(id, _)| id).collect()
+        STREAMS
+            .into_iter()
+            .zip(heard)
+            .filter(|(_, heard)| !heard)
+            .map(|(stream, _)| stream)
+            .collect()
     }
 }
 
@@ -190,12 +197,12 @@ mod tests {
     #[test]
     fn a_stream_that_stopped_is_asked_for_again() {
         let mut streams = Streams::default();
-        assert_eq!(streams.missing(), Streams::WANTED);
-        for id in Streams::WANTED {
+        assert_eq!(streams.missing(), STREAMS);
+        for (id, _) in STREAMS {
             streams.heard(id);
         }
         assert!(streams.missing().is_empty());
         streams.heard(MissionCurrent::ID);
-        assert_eq!(streams.missing(), [HOME_POSITION_DATA::ID, GLOBAL_POSITION_INT_DATA::ID]);
+        assert_eq!(streams.missing(), STREAMS[..2]);
     }
 }

@@ -7,7 +7,7 @@ use crate::link::message::{ParamError, ParamName, ParamRequestRead, ParamValue};
 
 /// An autopilot that has these parameters, and loses what `loses` says (counted from 0).
 async fn answer(
-    mut peer: Peer,
+    peer: &mut Peer,
     table: &[(&str, f32)],
     mut loses: impl FnMut(u32) -> bool,
     says_unknown: bool,
@@ -47,11 +47,11 @@ const NAMES: [&str; 4] = ["FENCE_MARGIN", "GF_ACTION", "FENCE_ALT_MAX", "FENCE_M
 #[tokio::test(start_paused = true)]
 async fn parameters_come_in_the_order_of_their_names_and_unknown_ones_are_none() {
     for says_unknown in [true, false] {
-        let (vehicle, peer, _task) = scene(ARDUPILOT).await;
+        let (vehicle, mut peer, _task) = scene(ARDUPILOT).await;
         let begin = Instant::now();
         let read = tokio::select! {
             read = vehicle.parameters(&NAMES) => read.unwrap(),
-            () = answer(peer, &TABLE, |_| false, says_unknown) => unreachable!(),
+            () = answer(&mut peer, &TABLE, |_| false, says_unknown) => unreachable!(),
         };
         let values: Vec<_> = read.iter().map(|value| value.map(ParameterValue::as_f64)).collect();
         assert_eq!(values, [Some(2.0), None, Some(100.0), Some(2.0)]);
@@ -61,12 +61,36 @@ async fn parameters_come_in_the_order_of_their_names_and_unknown_ones_are_none()
 }
 
 #[tokio::test(start_paused = true)]
+async fn what_a_vehicle_does_not_have_is_waited_for_once_and_noticed_when_it_comes() {
+    let (vehicle, mut peer, _task) = scene(ARDUPILOT).await;
+    let grown = [("FENCE_ALT_MAX", 100.0), ("FENCE_MARGIN", 2.0), ("GF_ACTION", 1.0)];
+    let mut took = Vec::new();
+    for (table, has) in [(&TABLE[..], false), (&TABLE, false), (&grown, true), (&grown, true)] {
+        let begin = Instant::now();
+        let read = tokio::select! {
+            read = vehicle.parameters(&NAMES) => read.unwrap(),
+            () = answer(&mut peer, table, |_| false, false) => unreachable!(),
+        };
+        assert_eq!((read[0].is_some(), read[1].is_some()), (true, has));
+        took.push(begin.elapsed());
+    }
+    assert!(took[0] >= Duration::from_secs(1), "{took:?}");
+    assert!(took[1..].iter().all(|took| *took < Duration::from_millis(100)), "{took:?}");
+    // Where nothing else is asked for, there is nothing to go by.
+    let alone = tokio::select! {
+        read = vehicle.parameter("NO_SUCH") => read.unwrap(),
+        () = answer(&mut peer, &TABLE, |_| false, false) => unreachable!(),
+    };
+    assert_eq!(alone, None);
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_parameter_is_asked_for_again_until_it_comes() {
-    let (vehicle, peer, _task) = scene(ARDUPILOT).await;
+    let (vehicle, mut peer, _task) = scene(ARDUPILOT).await;
     let read = tokio::select! {
         read = vehicle.parameter("FENCE_MARGIN") => read.unwrap(),
         // The name is lost eight times, the other question every second time.
-        () = answer(peer, &TABLE, |k| k < 16 && k % 4 != 1, false) => unreachable!(),
+        () = answer(&mut peer, &TABLE, |k| k < 16 && k % 4 != 1, false) => unreachable!(),
     };
     assert_eq!(read, Some(ParameterValue::Real(2.0)));
 }
