@@ -5,7 +5,8 @@ use std::time::SystemTime;
 
 use serde::Serialize;
 
-use super::speech::{Severity, Text, about_plan};
+use super::place::Place;
+use super::speech::{Severity, Text, about_fallback, about_plan};
 use super::work::Fingerprint;
 use crate::cli::CliError;
 use crate::link::message::CommandAck;
@@ -70,6 +71,8 @@ pub(super) struct Answer {
     pub(super) verdict: Verdict,
     /// What was planned from; `None` where that is not known or has to be looked at again.
     pub(super) fingerprint: Option<Fingerprint>,
+    /// Where the vehicle was then.
+    pub(super) planned_from: Option<Place>,
     /// For the pilot.
     pub(super) texts: Vec<Text>,
     /// The reason in full, where there is one.
@@ -93,13 +96,10 @@ pub(super) struct AnswerDocument<'a> {
 }
 
 impl Answer {
-    pub(super) fn planned(
-        planned: &Replanned,
-        document: PlanDocument,
-        picture: Option<String>,
-    ) -> Self {
-        let texts = about_plan(planned);
-        Self { texts, document: Some(document), picture, ..Self::default() }
+    pub(super) fn planned(planned: &Replanned, document: PlanDocument) -> Self {
+        let mut texts = about_plan(planned);
+        texts.extend(document.fallback.as_deref().map(about_fallback));
+        Self { texts, document: Some(document), ..Self::default() }
     }
 
     /// The vehicle holds it already.
@@ -108,6 +108,8 @@ impl Answer {
         if planned.is_changed() {
             let words = "the planned mission is on the vehicle";
             self.texts = vec![Text::new(Severity::Notice, words)];
+            let fallback = self.document.as_ref().and_then(|document| document.fallback.as_deref());
+            self.texts.extend(fallback.map(about_fallback));
         }
     }
 
@@ -164,8 +166,8 @@ impl Answer {
         };
         Self {
             fingerprint: before.fingerprint,
+            planned_from: before.planned_from,
             document: before.document,
-            picture: before.picture,
             ..Self::refused(verdict, words, obstacle.to_string())
         }
     }

@@ -2,10 +2,11 @@
 //!
 //! - here: signals, reloading, systemd, and looking for the vehicle on the configured links;
 //! - [`session`]: one vehicle from being found to being lost;
-//! - [`hints`]: signs of a change on the link; [`agenda`]: when to act on them;
+//! - [`hints`]: signs of a change on the link; [`place`]: a vehicle that has moved; [`agenda`]: when
+//!   to act on them;
 //! - [`work`]: one look, plan and upload, and its [`answer`];
 //! - [`requests`], [`own`], [`speech`]: quavd as a MAVLink component: commands, parameters, texts;
-//! - [`status`], [`socket`], [`history`]: what a person on the board can see.
+//! - [`status`], [`resources`], [`socket`], [`history`]: what a person on the board can see.
 //!
 //! One task looks after everything; only work, the link and the socket have tasks of their own.
 //! systemd's watchdog is fed by that task, and only while its loop goes round.
@@ -16,7 +17,9 @@ mod backoff;
 mod hints;
 mod history;
 mod own;
+mod place;
 mod requests;
+pub mod resources;
 mod session;
 pub(crate) mod socket;
 mod speech;
@@ -38,6 +41,7 @@ use self::answer::Verdict;
 use self::backoff::Backoff;
 use self::history::History;
 use self::own::Own;
+use self::place::Place;
 use self::session::{Connection, Ended, stay};
 use self::socket::Socket;
 use self::status::Board;
@@ -67,6 +71,8 @@ struct Service {
     trigger: Arc<Notify>,
     /// What was planned last.
     known: Option<Fingerprint>,
+    /// From where.
+    planned_from: Option<Place>,
     /// What the last answer was, so that the same trouble is told once.
     last: Option<Verdict>,
 }
@@ -152,14 +158,16 @@ async fn supervise(configuration: Configuration) -> Result<(), CliError> {
     let socket = Socket::bind(&path).map_err(|error| {
         CliError::Usage(format!("cannot make the status socket {}: {error}", path.display()))
     })?;
+    let own = Own::new(configuration.clone(), &state)?;
     let mut service = Service {
-        history: History::new(&state, u64::from(options.service.history) << 20),
-        own: Own::new(configuration.clone(), &state)?,
+        history: History::new(&state, own.room_for_history()),
+        own,
         store,
         board: Board::new(),
         pulse: Arc::new(Pulse::new()),
         trigger: Arc::new(Notify::new()),
         known: None,
+        planned_from: None,
         last: None,
     };
     service.tell_options();
@@ -180,13 +188,14 @@ async fn supervise(configuration: Configuration) -> Result<(), CliError> {
                 // Neither of these ends unasked.
                 () = &mut connected => Order::Reload,
                 () = &mut serving => Order::End,
-                order = obey(&mut signals, &pulse, &mut configuration) => order,
+                order = fed(&pulse, feed, obey(&mut signals, &board, &mut configuration)) => order,
             };
             halt.cancel();
             let stopping = [NotifyState::Stopping];
             let reloading = [NotifyState::Reloading];
             notify(if order == Order::End { &stopping } else { &reloading });
-            connected.await;
+            // An upload that goes on may take longer than systemd waits for a sign of life.
+            fed(&pulse, feed, connected).await;
             order
         };
         if order == Order::End {
@@ -195,6 +204,7 @@ async fn supervise(configuration: Configuration) -> Result<(), CliError> {
         }
         match Own::new(configuration.clone(), &state) {
             Ok(own) => {
+                service.history = History::new(&state, own.room_for_history());
                 service.own = own;
                 service.known = None;
                 service.tell_options();
@@ -206,31 +216,47 @@ async fn supervise(configuration: Configuration) -> Result<(), CliError> {
     }
 }
 
-/// Feeds the watchdog, and waits for a signal that has to be acted on. A configuration that cannot
-/// be used is told and not acted on.
-async fn obey(signals: &mut Signals, pulse: &Pulse, configuration: &mut Configuration) -> Order {
+/// Waits for a signal that has to be acted on. A configuration that cannot be used is told and not
+/// acted on.
+async fn obey(signals: &mut Signals, board: &Board, configuration: &mut Configuration) -> Order {
+    loop {
+        let order = signals.next().await;
+        if order == Order::End {
+            return order;
+        }
+        match configuration.again() {
+            Ok(read) => {
+                *configuration = read;
+                return order;
+            }
+            Err(error) => {
+                tracing::error!(%error, "not read again: the old one stays");
+                let trouble = format!("not read again: {error}");
+                board.change(|status| status.trouble = Some(trouble));
+            }
+        }
+    }
+}
+
+/// Waits for something, and feeds the watchdog meanwhile, as long as the loop that does the work
+/// goes round.
+async fn fed<T>(pulse: &Pulse, feed: impl Fn(), waiting: impl Future<Output = T>) -> T {
+    tokio::pin!(waiting);
     let mut tick = tokio::time::interval(TICK);
     loop {
         tokio::select! {
+            done = &mut waiting => return done,
             _ = tick.tick() => {
                 if pulse.is_alive() {
-                    notify(&[NotifyState::Watchdog]);
-                }
-            }
-            order = signals.next() => {
-                if order == Order::End {
-                    return order;
-                }
-                match configuration.again() {
-                    Ok(read) => {
-                        *configuration = read;
-                        return order;
-                    }
-                    Err(error) => tracing::error!(%error, "not read again: the old one stays"),
+                    feed();
                 }
             }
         }
     }
+}
+
+fn feed() {
+    notify(&[NotifyState::Watchdog]);
 }
 
 /// Tells systemd, where that started us.
@@ -347,5 +373,26 @@ impl Service {
             status.enabled = service.enable;
             status.policy = service.policy.name().to_owned();
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test(start_paused = true)]
+    async fn the_watchdog_is_fed_only_while_the_loop_goes_round() {
+        const MINUTE: Duration = Duration::from_secs(60);
+        let pulse = Pulse::new();
+        let meals = AtomicU64::new(0);
+        let feed = || {
+            meals.fetch_add(1, Ordering::Relaxed);
+        };
+        fed(&pulse, feed, pulse.beating(tokio::time::sleep(MINUTE))).await;
+        let while_it_went = meals.swap(0, Ordering::Relaxed);
+        assert!(while_it_went >= 59, "{while_it_went}");
+        fed(&pulse, feed, tokio::time::sleep(MINUTE)).await;
+        let while_it_was_stuck = meals.load(Ordering::Relaxed);
+        assert!(while_it_was_stuck <= STUCK.as_secs() + 1, "{while_it_was_stuck}");
     }
 }

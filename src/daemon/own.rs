@@ -69,6 +69,11 @@ impl Own {
         }
     }
 
+    /// Bytes that the reports of past plans may take.
+    pub(super) fn room_for_history(&self) -> u64 {
+        u64::from(self.options.service.history) << 20
+    }
+
     /// The value of one parameter, by name.
     pub(super) fn by_name(&self, name: ParamName) -> Option<ParamValue> {
         let index = PARAMETERS.iter().position(|own| ParamName::new(own.name) == Some(name))?;

@@ -11,6 +11,7 @@ use super::Service;
 use super::agenda::{Agenda, Due};
 use super::answer::{Answer, Verdict};
 use super::hints::{Hint, Hints};
+use super::place::Moves;
 use super::requests::{Asker, Request, answer};
 use super::speech::{Severity, Speaker, Text};
 use super::status::{LastAnswer, VehicleStatus};
@@ -60,6 +61,7 @@ struct Session<'a> {
     work: Option<(Work, Due)>,
     /// What a disarmed vehicle is waited for with.
     waits_for_disarming: bool,
+    moves: Moves,
 }
 
 /// Stays with a vehicle.
@@ -77,6 +79,7 @@ pub(super) async fn stay(
         agenda: Agenda::new(now, times.quiet_time(), Duration::from_secs(times.poll.into())),
         work: None,
         waits_for_disarming: false,
+        moves: Moves::default(),
         service,
         link,
         vehicle,
@@ -239,6 +242,7 @@ impl Session<'_> {
         } else {
             // What was just written is a change as well: the next look sees that it is ours.
             self.service.known = answer.fingerprint;
+            self.service.planned_from = answer.planned_from;
         }
         if verdict == Verdict::Overtaken {
             self.service.board.change(|status| status.counts.cancelled += 1);
@@ -299,6 +303,7 @@ impl Session<'_> {
                 trigger: due.trigger.to_owned(),
                 text: answer.texts.iter().map(|text| text.words.clone()).collect(),
                 reason: answer.reason.clone(),
+                fallback: answer.document.as_ref().and_then(|plan| plan.fallback.clone()),
                 report,
                 took_ms: u64::try_from(took.as_millis()).unwrap_or(u64::MAX),
             });
@@ -313,6 +318,14 @@ impl Session<'_> {
             self.waits_for_disarming = false;
             self.service.known = None;
             self.agenda.changed(now, "the vehicle was disarmed");
+        }
+        if let Some(planned) = self.service.planned_from
+            && self.moves.has_moved(now, planned, &state)
+        {
+            self.service.known = None;
+            self.service.planned_from = None;
+            self.agenda.changed(now, "the vehicle or its home is in another place");
+            self.overtake("the vehicle or its home is in another place");
         }
         let phase = self.work.as_ref().map(|(work, _)| work.phase());
         self.service.board.change(|status| {
@@ -343,10 +356,12 @@ impl Session<'_> {
             work.ended().await;
         } else {
             tracing::info!(why = %ended, "an upload goes on; waiting for its end");
-            match tokio::time::timeout(LAST_UPLOAD, work.ended()).await {
+            let pulse = Arc::clone(&self.service.pulse);
+            match pulse.beating(tokio::time::timeout(LAST_UPLOAD, work.ended())).await {
                 Ok(End::Answered(answer)) => {
                     let due = due.clone();
                     self.service.known = answer.fingerprint;
+                    self.service.planned_from = answer.planned_from;
                     self.record(&answer, &due, Instant::now());
                 }
                 Ok(_) => {}

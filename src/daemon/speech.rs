@@ -146,6 +146,11 @@ pub(super) fn about_plan(result: &Replanned) -> Vec<Text> {
         .collect()
 }
 
+/// That something else was used than what was asked for.
+pub(super) fn about_fallback(fallback: &str) -> Text {
+    Text::new(Severity::Notice, format!("fallback: {fallback}"))
+}
+
 fn metres(clearance: f64) -> String {
     if clearance.is_finite() { format!("{clearance:.1} m") } else { "free".to_owned() }
 }

@@ -6,6 +6,8 @@ use std::time::{Instant, SystemTime};
 
 use serde::{Deserialize, Serialize};
 
+use super::resources::Resources;
+
 /// The state of the daemon.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Status {
@@ -31,6 +33,8 @@ pub struct Status {
     pub last: Option<LastAnswer>,
     /// What has been counted since the start.
     pub counts: Counts,
+    /// What it takes of the machine.
+    pub resources: Resources,
 }
 
 /// The vehicle as last heard.
@@ -59,6 +63,8 @@ pub struct LastAnswer {
     pub text: Vec<String>,
     /// The reason in full, where there is one.
     pub reason: Option<String>,
+    /// What was used instead of what was asked for, and why.
+    pub fallback: Option<String>,
     /// The report.
     pub report: Option<String>,
     /// From the sign of the change to the answer, milliseconds, pause included.
@@ -109,6 +115,7 @@ impl Board {
     pub(super) fn read(&self) -> Status {
         let mut status = self.status.lock().unwrap_or_else(PoisonError::into_inner).clone();
         status.uptime_s = self.began.elapsed().as_secs();
+        status.resources = Resources::now();
         status
     }
 }
@@ -154,6 +161,9 @@ impl Status {
             if let Some(reason) = &last.reason {
                 line("", reason);
             }
+            if let Some(fallback) = &last.fallback {
+                line("fallback", fallback);
+            }
             if let Some(report) = &last.report {
                 line("report", report);
             }
@@ -164,6 +174,14 @@ impl Status {
             &format!(
                 "{connections} connections, {looks} looks, {answers} answers, {uploads} uploads, \
                  {cancelled} plans overtaken"
+            ),
+        );
+        let Resources { rss_kib, threads, descriptors, tasks } = self.resources;
+        line(
+            "resources",
+            &format!(
+                "{} MiB, {threads} threads, {tasks} tasks, {descriptors} descriptors",
+                rss_kib / 1024
             ),
         );
         out

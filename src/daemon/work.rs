@@ -12,6 +12,7 @@ use tokio::sync::watch;
 use tokio::task::JoinHandle;
 
 use super::answer::{Answer, Verdict};
+use super::place::Place;
 use crate::cli::CliError;
 use crate::cli::flight::way_is_clear;
 use crate::cli::once::{Held, Read, in_flight, intended, read};
@@ -239,8 +240,11 @@ async fn work(
     if !order.plan || (order.known == Some(fingerprint) && !order.force) {
         return Ok(End::Seen(fingerprint));
     }
+    // As it was before what follows read it: what moves from now on has moved.
+    let place = Place::of(&vehicle.state());
     let known = |mut answer: Box<Answer>| {
         answer.fingerprint = Some(fingerprint);
+        answer.planned_from = Some(place);
         answer
     };
     let places = usize::from(vehicle.autopilot() == Autopilot::ArduPilot);
@@ -274,10 +278,9 @@ async fn work(
             return Ok(End::Answered(known(Box::new(Answer::no_plan(&error, document)))));
         }
     };
-    let document = PlanDocument::planned(&planned, &run);
-    let drawn = picture(&planned, &run, &format!("mission of {}", vehicle.node()));
-    let mut answer = Answer::planned(&planned, document, drawn.ok());
+    let mut answer = Answer::planned(&planned, PlanDocument::planned(&planned, &run));
     answer.fingerprint = Some(fingerprint);
+    answer.planned_from = Some(place);
     let list = intended(vehicle, &read, &planned, flight.as_ref(), &options.writing);
     let list = list.and_then(|list| match &flight {
         Some(_) => way_is_clear(vehicle, &read, &list, &planning).map(|()| list),
@@ -285,7 +288,7 @@ async fn work(
     });
     match list {
         Ok(intended) => {
-            deliver(order, gate, phase, (&input, read), intended, &planned, &mut answer).await;
+            deliver(order, gate, phase, (&input, &read), intended, &planned, &mut answer).await;
         }
         Err(error) => {
             let Answer { verdict, texts, reason, .. } = *Answer::from_cli(error);
@@ -295,6 +298,7 @@ async fn work(
     if answer.verdict == Verdict::Cancelled {
         return Ok(End::Cancelled);
     }
+    answer.picture = picture(&planned, &run, &format!("mission of {}", vehicle.node())).ok();
     Ok(End::Answered(Box::new(answer)))
 }
 
@@ -375,7 +379,7 @@ async fn deliver(
     order: &Order,
     gate: &Gate,
     phase: &watch::Sender<Phase>,
-    (input, read): (&Held, Read),
+    (input, read): (&Held, &Read),
     intended: Vec<MissionItem>,
     planned: &Replanned,
     answer: &mut Answer,
@@ -392,15 +396,18 @@ async fn deliver(
     }
     let replacement = Replacement {
         mission_type: MissionType::Mission,
-        original: read.original,
-        before: read.held,
+        original: read.original.clone(),
+        before: read.held.clone(),
         intended,
     };
     let mut on_step = |step| tell(phase, step);
     match replace(vehicle, store, replacement, options.writing.while_armed(), &mut on_step).await {
         Ok(record) => {
             answer.uploaded(record.intended.len());
-            answer.fingerprint = after_upload(vehicle, input, &record.intended).await;
+            // The next look knows by this that what is new is our own.
+            let mission = record.read_back.unwrap_or(record.intended);
+            let held = Held { mission, ..input.clone() };
+            answer.fingerprint = Some(Fingerprint::of(autopilot, &held));
         }
         Err(ReplaceError { obstacle: Obstacle::Changed { .. }, .. }) => {
             // Newer input: the change that was found is looked at next.
@@ -409,20 +416,6 @@ async fn deliver(
         }
         Err(error) => *answer = Answer::not_delivered(&error, std::mem::take(answer)),
     }
-}
-
-/// What the vehicle holds now, so that the next look knows it for our own: the uploaded mission with
-/// the fence that it was planned for. `None` where somebody has changed the mission since.
-async fn after_upload(
-    vehicle: &Vehicle,
-    input: &Held,
-    intended: &[MissionItem],
-) -> Option<Fingerprint> {
-    let mission = vehicle.download(MissionType::Mission, &mut |_| {}).await.ok()?.items;
-    let autopilot = vehicle.autopilot();
-    let is_ours = differences(autopilot, MissionType::Mission, intended, &mission).is_empty();
-    let held = Held { mission, ..input.clone() };
-    is_ours.then(|| Fingerprint::of(autopilot, &held))
 }
 
 impl From<CliError> for Box<Answer> {
