@@ -15,7 +15,7 @@ use zip::ZipArchive;
 const MEMORY: u64 = 1 << 30;
 
 /// The Python that has qiskit: `QUAV_IBM_PYTHON`, or the environment `make` builds for it.
-fn python() -> PathBuf {
+pub(crate) fn python() -> PathBuf {
     let venv = Path::new(env!("CARGO_MANIFEST_DIR")).join(".venv-ibm/bin/python");
     let python = std::env::var_os("QUAV_IBM_PYTHON").map_or(venv, PathBuf::from);
     assert!(
