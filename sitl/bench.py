@@ -50,6 +50,8 @@ class Daemon:
         config.write_text(f'connect = "{url}"\nsystem = 1\n{more}\n')
         self.log = open(pathlib.Path(directory) / "quavd.log", "w")
         environment = {"PATH": os.environ["PATH"], "STATE_DIRECTORY": str(self.state)}
+        if "RUST_LOG" in os.environ:
+            environment["RUST_LOG"] = os.environ["RUST_LOG"]
         self.process = subprocess.Popen([self.quavd, "run", "--config", str(config)],
                                         env=environment, stdout=subprocess.DEVNULL, stderr=self.log)
 
@@ -97,5 +99,11 @@ class Daemon:
         began = time.monotonic()
         self.process.send_signal(signal.SIGTERM)
         code = self.process.wait(30)
+        took = time.monotonic() - began
         self.log.close()
-        return code, time.monotonic() - began
+        return code, took
+
+    def kill(self):
+        """Ends it for certain, where it has not ended."""
+        self.process.kill()
+        self.process.wait()
