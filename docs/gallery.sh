@@ -32,7 +32,7 @@ for plan in fence_examples/*.plan; do
 	code=0
 	said=$("$quavd" --quiet plan "$plan" --out "$out/$name.svg" --out "$out/$name.html" --out "$out/$name.plan" 2>&1) || code=$?
 	[ $code = 0 ] || [ $code = 3 ] || { echo "$plan: $said" >&2; exit $code; }
-	first=$(printf '%s' "$said" | head -1 | sed 's/&/\&amp;/g; s/</\&lt;/g')
+	first=$(printf '%s' "$said" | awk '!NF {exit} 1' | sed 's/&/\&amp;/g; s/</\&lt;/g')
 	files="<a href=\"$name.html\">report</a>"
 	[ $code = 3 ] || files="$files, <a href=\"$name.plan\">planned mission</a>"
 	cat >>"$index" <<ENTRY

@@ -65,6 +65,7 @@ pub fn run(args: &CheckArgs, shown: &Shown) -> Result<String, CliError> {
     };
     let options = args.safety.options();
     let verdict = judge(&input, &options)?;
+    scenario.warnings.extend(files::doubt(&scenario.fences, &verdict));
     shown.warn(&scenario.warnings);
     let run = Run { options: &options, warnings: &scenario.warnings, load, total: began.elapsed() };
     if !args.out.is_empty() {

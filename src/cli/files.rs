@@ -13,7 +13,9 @@ use crate::formats::{
     write_waypoints_rally,
 };
 use crate::mission::Mission;
+use crate::replan::Verdict;
 use crate::report::{Report, ReportError};
+use crate::units::Metres;
 
 /// A file that cannot be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -137,6 +139,25 @@ pub fn add_fences(
         add(fences, warnings, more.fences, more.warnings);
     }
     Ok(())
+}
+
+/// What says that the files are most likely not the ones that were meant.
+#[must_use]
+pub fn doubt(fences: &FenceSet, verdict: &Verdict) -> Option<String> {
+    /// Farther than missions go.
+    const FAR: Metres = Metres(20_000.0);
+    if fences.regions.is_empty() {
+        let text = "no fence or obstacle was given, so nothing is in the way; name the files that \
+                    hold them with --fence or --obstacles";
+        return Some(text.to_owned());
+    }
+    let clearance = verdict.clearance();
+    (clearance > FAR && clearance.0.is_finite()).then(|| {
+        let km = clearance.0 / 1000.0;
+        format!(
+            "the nearest fence is {km:.0} km from the mission: are the files of the same place?"
+        )
+    })
 }
 
 /// The fences of `--fence` and `--obstacles`, file by file.

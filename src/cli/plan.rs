@@ -73,7 +73,10 @@ pub fn run(args: &PlanArgs, shown: &Shown) -> Result<String, CliError> {
         Err(CliError::NoPath { .. }) => judge(&input, &options).ok(),
         _ => None,
     };
-    let warnings = &scenario.warnings;
+    let judged = planned.as_ref().ok().map(|planned| &planned.before).or(before.as_ref());
+    let doubt = judged.and_then(|verdict| files::doubt(&scenario.fences, verdict));
+    shown.warn(&doubt);
+    let warnings = &[scenario.warnings.as_slice(), doubt.as_slice()].concat();
     let total = began.elapsed();
     let outcome = Outcome { planned, before, options: &options, warnings, load, total };
     let title = name_of(&args.scenario);

@@ -98,7 +98,10 @@ pub enum Problem {
         limit: usize,
     },
     /// Not UTF-8 text.
-    #[error("this is not UTF-8 text; save it as UTF-8 (byte {at} is not)")]
+    #[error(
+        "byte {at} is not UTF-8 text: a picture, a shapefile or the like is none of the formats \
+         quavd reads; text has to be saved as UTF-8"
+    )]
     NotText {
         /// Offset of the first bad byte.
         at: usize,

@@ -209,6 +209,28 @@ fn check_finds_the_collision_in_the_original_and_none_in_the_plan() {
 }
 
 #[test]
+fn files_that_do_not_belong_together_are_doubted() {
+    let said = |arguments: &[&str]| {
+        let output = quavd(arguments);
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}");
+        let text = String::from_utf8(output.stdout).unwrap();
+        text.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let example = |name: &str| root(&format!("fence_examples/{name}")).display().to_string();
+    let (mission, fence) = (example("one-polygon.waypoints"), example("one-polygon.kml"));
+    let (elsewhere, planned) = (example("infeasible.plan"), example("one-polygon.plan"));
+    let none = "warning: no fence or obstacle was given";
+    // The two files of `check` in the wrong order.
+    assert!(said(&["check", &mission, &mission]).contains(none));
+    assert!(said(&["plan", &mission]).contains(none));
+    let text = said(&["plan", &mission, "--fence", &elsewhere]);
+    assert!(text.contains("km from the mission: are the files of the same place?"), "{text}");
+    for right in [&["plan", &mission, "--fence", &fence][..], &["plan", &planned]] {
+        assert!(!said(right).contains("warning"), "{right:?}");
+    }
+}
+
+#[test]
 fn every_example_plans_or_says_why_not() {
     let mut plans = 0;
     for entry in std::fs::read_dir(root("fence_examples")).unwrap() {

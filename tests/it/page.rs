@@ -71,7 +71,8 @@ fn a_report_loads_without_an_error_and_reacts() {
         mark.dispatchEvent(new PointerEvent("pointermove", { bubbles: true, clientX: x, clientY: y }));
         console.assert(document.documentElement.scrollWidth <= innerWidth, "the page is too wide");
     "#;
-    for more in [&["--window-size=1280,900"][..], &["--window-size=400,800"]] {
+    let dark = "--blink-settings=preferredColorScheme=0";
+    for more in [&["--window-size=1280,900"][..], &["--window-size=400,800", dark]] {
         let (document, console) = loaded(&browser, &page, script, more);
         assert_eq!(console, "", "{more:?}");
         assert!(document.contains("scale(1.4)"), "zoomed");

@@ -29,7 +29,7 @@ pub fn comparison_page(comparison: &Comparison, command: &str) -> String {
     ];
     let figures: String =
         blocks.into_iter().map(|(title, value)| block(comparison, title, value)).collect();
-    content += &section("Figures", &figures);
+    content += &section("Figures", &beside(&figures));
     let reasons = reasons(comparison);
     if !reasons.is_empty() {
         content += &section("Where no path was found", &reasons);
@@ -42,7 +42,7 @@ pub fn comparison_page(comparison: &Comparison, command: &str) -> String {
     content += &section("Training", &format!("<div class=\"charts\">{curves}</div>\n"));
     if !comparison.growth.is_empty() {
         let growth: String = comparison.growth.iter().map(growth).collect();
-        content += &section("How time grows with the number of edges", &growth);
+        content += &section("How time grows with the number of edges", &beside(&growth));
     }
     let reproduce = format!(
         "<pre>{}</pre>\n<p><button type=\"button\" id=\"save\" data-name=\"compare.json\" \
@@ -52,6 +52,11 @@ pub fn comparison_page(comparison: &Comparison, command: &str) -> String {
     );
     content += &section("Reproduce", &reproduce);
     page("quavd compare", &content)
+}
+
+/// Tables side by side, as far as there is room.
+fn beside(tables: &str) -> String {
+    format!("<div class=\"tables\">{tables}</div>\n")
 }
 
 fn lengths(comparison: &Comparison) -> String {

@@ -64,7 +64,7 @@ fn headline(report: &Report<'_>) -> String {
         },
     };
     let class = if good { "good" } else { "bad" };
-    out += &format!("<p class=\"verdict {class}\">{}</p>\n", escaped(&verdict));
+    out += &format!("<p class=\"verdict {class}\">{}</p>\n", escaped(&with_units(&verdict)));
     let mut figures = vec![("Length", before.length().to_string())];
     figures.push(("Least clearance", clearance(before.clearance())));
     if let Some(planned) = report.planned.filter(|planned| planned.is_changed()) {
@@ -81,9 +81,18 @@ fn headline(report: &Report<'_>) -> String {
     figures.push(("Buffer", buffer.to_string()));
     out += "<dl class=\"figures\">";
     for (name, value) in figures {
-        out += &format!("<div><dt>{name}</dt><dd>{}</dd></div>", escaped(&value));
+        out += &format!("<div><dt>{name}</dt><dd>{}</dd></div>", escaped(&with_units(&value)));
     }
     out + "</dl>\n"
+}
+
+/// Text in which no line is broken between a number and its unit.
+fn with_units(text: &str) -> String {
+    let mut out = text.replace(" %", "\u{a0}%");
+    for digit in '0'..='9' {
+        out = out.replace(&format!("{digit} m"), &format!("{digit}\u{a0}m"));
+    }
+    out
 }
 
 fn map_section(map: &InteractiveMap<'_>, report: &Report<'_>) -> String {

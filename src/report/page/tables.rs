@@ -1,5 +1,7 @@
 //! The tables of the report.
 
+use serde_json::Value;
+
 use super::html::table;
 use crate::planner::rounds::{Challenger, Round};
 use crate::replan::{LegRecord, Options, Replanned};
@@ -112,19 +114,31 @@ pub(super) fn told_rounds(record: &LegRecord) -> Vec<String> {
     std::iter::once(first).chain(record.rounds.iter().enumerate().map(told)).collect()
 }
 
-/// The settings by the names of their options.
+/// The settings by the names of their options; what was not asked for is left out.
 pub(super) fn settings(options: &Options) -> String {
     let document = serde_json::to_value(SettingsDocument::from(options)).unwrap_or_default();
     let rows: Vec<Vec<String>> = document
         .as_object()
         .into_iter()
         .flatten()
+        .filter(|(_, value)| !is_empty(value))
         .map(|(name, value)| {
             let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
             vec![name.replace('_', " "), value]
         })
         .collect();
-    table("Settings", &["setting", "value"], &rows)
+    let table = table("Settings", &["setting", "value"], &rows);
+    format!("<div class=\"settings\">{table}</div>\n")
+}
+
+/// Nothing, or a list or an object of nothing.
+fn is_empty(value: &Value) -> bool {
+    match value {
+        Value::Null => true,
+        Value::Array(list) => list.is_empty(),
+        Value::Object(object) => object.values().all(is_empty),
+        _ => false,
+    }
 }
 
 /// Where the time went.
