@@ -20,7 +20,7 @@ pub use settle::settle;
 
 use self::guard::{InFlight, Permit, may_write};
 use self::put::{Putting, What};
-use self::settle::{Suspect, settle_record};
+use self::settle::{Finding, Suspect, finding, settle_record};
 use super::Vehicle;
 use super::readback::{changes, differences};
 use super::transfer::{OnProgress, Progress};
@@ -108,6 +108,16 @@ pub async fn replace(
         Err(obstacle) => {
             tracing::warn!(plan = %mission_type, %obstacle, "upload failed");
             let ours = Suspect::Ourselves;
+            // On the disk, so that also a later start knows it for the vehicle's version of ours.
+            if let Obstacle::Mismatch { held, .. } = &obstacle
+                && finding(&vehicle.id(), &record, held, ours) == Finding::Mangled
+            {
+                record.found = Some(held.clone());
+                let with_found = record.clone();
+                if let Err(error) = on_disk(store, move |store| store.update(&with_found)).await {
+                    tracing::warn!(%error, "what the vehicle made of the plan is not saved");
+                }
+            }
             match settle_record(vehicle, store, &mut record, while_armed, ours, on_step).await {
                 // The acknowledgement was lost on the way, the plan was not.
                 Ok(Settled::Finished) => Ok(record),

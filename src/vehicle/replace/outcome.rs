@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use super::super::readback::Difference;
 use super::super::transfer::TransferError;
 use crate::link::SystemId;
-use crate::mission::MissionType;
+use crate::mission::{MissionItem, MissionType};
 use crate::store::StoreError;
 
 /// How an open record was settled.
@@ -90,6 +90,8 @@ pub enum Obstacle {
         mission_type: MissionType,
         /// Field by field.
         differences: Vec<Difference>,
+        /// What it holds.
+        held: Vec<MissionItem>,
     },
     /// Nothing to go back to.
     #[error("no earlier {mission_type} of system {system} was saved here")]

@@ -115,7 +115,7 @@ impl Putting<'_> {
         if differences.is_empty() {
             return Ok(held);
         }
-        Err(Obstacle::Mismatch { mission_type, differences })
+        Err(Obstacle::Mismatch { mission_type, differences, held })
     }
 
     async fn proven_again(

@@ -104,7 +104,7 @@ pub(super) fn finding(
     held: &[MissionItem],
     suspect: Suspect,
 ) -> Finding {
-    let Record { mission_type, before, intended, .. } = record;
+    let Record { mission_type, before, intended, found, .. } = record;
     let (autopilot, mission_type) = (vehicle.autopilot, *mission_type);
     if changes(autopilot, mission_type, before, held).is_empty() {
         return Finding::Old;
@@ -125,11 +125,11 @@ pub(super) fn finding(
         }
         Suspect::Anybody => true,
     };
-    let longest = before.len().max(intended.len());
-    let is_either = |k: usize| {
-        is_at(autopilot, mission_type, before, held, k)
-            || is_at(autopilot, mission_type, intended, held, k)
-    };
+    // What was found right after the upload is what the vehicle made of it.
+    let plans = [before, intended, found.as_ref().unwrap_or(before)];
+    let longest = plans.iter().map(|plan| plan.len()).max().unwrap_or(0);
+    let is_either =
+        |k: usize| plans.iter().any(|plan| is_at(autopilot, mission_type, plan, held, k));
     if ours && held.len() <= longest && (home_slot..held.len()).all(is_either) {
         return Finding::Mixture;
     }
@@ -248,6 +248,16 @@ mod tests {
         }
         assert_eq!(found(&[0, 11, 12, 99, 14, 15], Suspect::Ourselves), Mangled);
         assert_eq!(found(&[0, 11, 12, 99, 14, 15], Suspect::Anybody), SomebodyElses);
+    }
+
+    #[test]
+    fn what_the_vehicle_made_of_our_plan_is_known_again_later() {
+        let record =
+            Record { found: Some(plan(&[0, 11, 12, 99, 14, 15])), ..record(MissionType::Mission) };
+        let later = |held: &[i32]| finding(&vehicle(5), &record, &plan(held), Suspect::Anybody);
+        assert_eq!(later(&[0, 11, 12, 99, 14, 15]), Finding::Mixture);
+        assert_eq!(later(&[0, 1, 2, 99, 14, 15]), Finding::Mixture, "putting it back broke off");
+        assert_eq!(later(&[0, 11, 12, 98, 14, 15]), Finding::SomebodyElses);
     }
 
     #[test]
