@@ -25,7 +25,7 @@ use crate::vehicle::{Search, Timing};
 #[derive(Debug, Clone, Args)]
 pub struct SafetyArgs {
     /// Distance to keep from every obstacle and fence edge, metres.
-    #[arg(long, default_value_t = 5.0, value_parser = buffer, value_name = "M")]
+    #[arg(long, default_value_t = 5.0, value_parser = buffer, allow_negative_numbers = true, value_name = "M")]
     pub buffer: f64,
     /// Zone of the projection: auto (of each leg), or EPSG:n (UTM or UPS).
     #[arg(long, default_value = "auto", value_parser = zone, value_name = "ZONE")]
@@ -40,11 +40,11 @@ pub struct SafetyArgs {
     pub ignore_disabled_fence: bool,
     /// Vertical distance to keep from an obstacle with a height, to be flown over or under it,
     /// metres.
-    #[arg(long, default_value_t = 10.0, value_parser = vertical, value_name = "M")]
+    #[arg(long, default_value_t = 10.0, value_parser = vertical, allow_negative_numbers = true, value_name = "M")]
     pub vertical_margin: f64,
     /// The ground at any obstacle is at most this many metres above or below home. Only with this
     /// are heights above ground compared with altitudes above home.
-    #[arg(long, value_parser = vertical, value_name = "M")]
+    #[arg(long, value_parser = vertical, allow_negative_numbers = true, value_name = "M")]
     pub ground_relief: Option<f64>,
     /// More fences from a file (.plan, waypoints, GeoJSON, KML, fence text); may be repeated.
     #[arg(long, value_name = "FILE")]

@@ -229,6 +229,30 @@ proptest! {
 }
 
 #[test]
+fn heights_are_kept_across_geojson_kml_and_kmz() {
+    for (properties, amsl) in [
+        (r#"{"name":"mast","height":12.5}"#, false),
+        (r#"{"min_height":3,"max_height":20}"#, false),
+        (r#"{"height":455.25,"height_reference":"amsl"}"#, true),
+    ] {
+        let scenario = parse(&format!(
+            r#"{{"type":"Feature","properties":{properties},"geometry":{{"type":"Polygon",
+            "coordinates":[[[8,47],[8.1,47],[8.1,47.1],[8,47]]]}}}}"#
+        ));
+        let heights = scenario.fences.regions[0].heights.unwrap();
+        assert_eq!(heights.reference == crate::fence::HeightReference::MeanSeaLevel, amsl);
+        // As they were read, and from a vehicle's or another file's regions.
+        for scenario in [scenario.clone(), Scenario { kept: Kept::default(), ..scenario }] {
+            let kmz = read_scenario("file", &write_kmz(&scenario).unwrap()).unwrap();
+            let geojson = parse(&write_geojson(&scenario).unwrap());
+            for again in [geojson, parse(&write_kml(&scenario).unwrap()), kmz] {
+                assert_eq!(again.fences.regions[0].heights, Some(heights), "{properties}");
+            }
+        }
+    }
+}
+
+#[test]
 fn a_plan_keeps_the_vehicle_it_was_drawn_for() {
     let vehicle = VehicleHint {
         autopilot: Autopilot::Px4,

@@ -188,7 +188,9 @@ fn nobody_there_ends_with_4_and_a_bad_option_with_2() {
     assert_eq!(output.status.code(), Some(4));
     assert_eq!(quavd(&["once", "--connect", "carrier-pigeon:1"]).status.code(), Some(2));
     assert_eq!(quavd(&["plan", "no-such-file.plan"]).status.code(), Some(2));
-    assert_eq!(quavd(&["plan", &example("s1"), "--buffer", "-1"]).status.code(), Some(2));
+    let negative = quavd(&["plan", &example("s1"), "--buffer", "-1"]);
+    assert_eq!(negative.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&negative.stderr).contains("'-1' is not a number from"));
 }
 
 #[test]
