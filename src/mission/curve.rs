@@ -22,6 +22,7 @@
 use std::collections::HashMap;
 
 use geo::{Distance, Euclidean, Geodesic, Line, Point};
+use nalgebra::Vector2;
 
 use super::commands::{Destination, Role};
 use super::item::MissionItem;
@@ -66,16 +67,10 @@ const STEPS: u32 = 256;
 const DEGREE: f64 = 111_318.845;
 
 /// North and east, metres.
-type Vector = [f64; 2];
-
-fn vector(from: LatLon, to: LatLon) -> Vector {
+fn vector(from: LatLon, to: LatLon) -> Vector2<f64> {
     let turn = (to.lon() - from.lon() + 540.0).rem_euclid(360.0) - 180.0;
     let middle = (to.lat() + from.lat()) / 2.0;
-    [(to.lat() - from.lat()) * DEGREE, turn * DEGREE * middle.to_radians().cos()]
-}
-
-fn length([north, east]: Vector) -> f64 {
-    north.hypot(east)
+    Vector2::new(to.lat() - from.lat(), turn * middle.to_radians().cos()) * DEGREE
 }
 
 /// Tightens the bounds of splines by the legs before and after each.
@@ -127,25 +122,25 @@ pub(super) fn bend_splines(items: &[MissionItem], legs: &mut [Leg]) {
 fn tighten(leg: &mut Leg, before: &[Leg], after: &[Leg], is_spline: &dyn Fn(&Leg) -> bool) {
     let (from, to) = (leg.from.position, leg.to.position);
     let chord = vector(from, to);
-    let starts: Vec<(Vector, Option<f64>)> = before
+    let starts: Vec<(Vector2<f64>, Option<f64>)> = before
         .iter()
         .map(|into| {
             // A spline into a spline ends along the line from its start to the end of this one.
             let end = if is_spline(into) { &leg.to } else { &leg.from };
             (vector(into.from.position, end.position), climb(&into.from, end))
         })
-        .chain([(chord, climb(&leg.from, &leg.to)), ([0.0; 2], Some(0.0))])
+        .chain([(chord, climb(&leg.from, &leg.to)), (Vector2::zeros(), Some(0.0))])
         .collect();
-    let ends: Vec<(Vector, Option<f64>)> = after
+    let ends: Vec<(Vector2<f64>, Option<f64>)> = after
         .iter()
         .map(|on| {
             let start = if is_spline(on) { &leg.from } else { &leg.to };
             (vector(start.position, on.to.position), climb(start, &on.to))
         })
-        .chain([([0.0; 2], Some(0.0))])
+        .chain([(Vector2::zeros(), Some(0.0))])
         .collect();
-    let reach = |vectors: &[(Vector, Option<f64>)]| {
-        vectors.iter().map(|(v, _)| length(*v)).fold(length(chord), f64::max)
+    let reach = |vectors: &[(Vector2<f64>, Option<f64>)]| {
+        vectors.iter().map(|(v, _)| v.norm()).fold(chord.norm(), f64::max)
     };
     if reach(&starts).max(reach(&ends)) > LONGEST {
         return;
@@ -156,7 +151,7 @@ fn tighten(leg: &mut Leg, before: &[Leg], after: &[Leg], is_spline: &dyn Fn(&Leg
             aside = aside.max(farthest(chord, *p, *n));
         }
     }
-    let steepest = |vectors: &[(Vector, Option<f64>)]| {
+    let steepest = |vectors: &[(Vector2<f64>, Option<f64>)]| {
         let climbs: Option<Vec<f64>> = vectors.iter().map(|(_, climb)| *climb).collect();
         climbs.map(|climbs| climbs.into_iter().map(f64::abs).fold(0.0, f64::max))
     };
@@ -181,23 +176,24 @@ fn climb(from: &LegEnd, to: &LegEnd) -> Option<f64> {
 
 /// How far any curve along `chord` whose end velocities are `p` and `n`, or zero, can be from the
 /// chord, metres.
-fn farthest(chord: Vector, p: Vector, n: Vector) -> f64 {
-    let line = Line::new((0.0, 0.0), (chord[0], chord[1]));
+fn farthest(chord: Vector2<f64>, p: Vector2<f64>, n: Vector2<f64>) -> f64 {
+    let line = Line::new((0.0, 0.0), (chord.x, chord.y));
     let mut most: f64 = 0.0;
     for (a, b) in [(0.0, 1.0), (1.0, 0.0), (1.0, 1.0)] {
         for step in 0..=STEPS {
             let t = f64::from(step) / f64::from(STEPS);
             let along = t * t * (3.0 - 2.0 * t);
             let (early, late) = (a * t * (1.0 - t).powi(2), b * t * t * (1.0 - t));
-            let at = |axis: usize| chord[axis] * along + p[axis] * early - n[axis] * late;
-            most = most.max(Euclidean.distance(&Point::new(at(0), at(1)), &line));
+            let at = chord * along + p * early - n * late;
+            most = most.max(Euclidean.distance(&Point::new(at.x, at.y), &line));
         }
     }
-    most + (1.5 * length(chord) + length(p) + length(n)) / f64::from(2 * STEPS)
+    most + (1.5 * chord.norm() + p.norm() + n.norm()) / f64::from(2 * STEPS)
 }
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
     use proptest::prelude::*;
 
     use super::*;
@@ -205,22 +201,19 @@ mod tests {
     use crate::mission::altitude::Altitude;
     use crate::mission::testing::{at, item_at, mission, takeoff, waypoint};
 
-    type Space = [f64; 3];
-
-    fn size(vector: Space) -> f64 {
-        vector.iter().map(|x| x * x).sum::<f64>().sqrt()
-    }
+    /// North, east and up, metres.
+    type Space = Vector3<f64>;
 
     /// The point of ArduPilot's spline at a time, as an offset from the point of the straight line
     /// that a spline with no velocities would be at.
     fn offset(chord: f64, mut start: Space, mut end: Space, time: f64) -> Space {
-        let speed = size(start) + size(end);
+        let speed = start.norm() + end.norm();
         if speed > 4.0 * chord {
-            start = start.map(|x| x * 4.0 * chord / speed);
-            end = end.map(|x| x * 4.0 * chord / speed);
+            start *= 4.0 * chord / speed;
+            end *= 4.0 * chord / speed;
         }
         let (early, late) = (time * (1.0 - time).powi(2), time.powi(2) * (1.0 - time));
-        [0, 1, 2].map(|axis| start[axis] * early - end[axis] * late)
+        start * early - end * late
     }
 
     fn end(north: i32, metres: f32) -> LegEnd {
@@ -239,19 +232,18 @@ mod tests {
             let (from, to) = (end(0, 200.0), end(3, 200.0 + climb));
             let chord = ground_distance(&from, &to).hypot(f64::from(climb));
             let bound = spline_bound(&from, &to).unwrap();
-            let [north, east, _] = offset(chord, start, end_velocity, time);
-            prop_assert!(north.hypot(east) <= bound.0);
+            let aside = offset(chord, start.into(), end_velocity.into(), time);
+            prop_assert!(aside.xy().norm() <= bound.0);
         }
     }
 
     /// The curve of one spline as ArduPilot computes it, from its own velocities.
     fn flown(o: Space, d: Space, p: Space, n: Space) -> Vec<Space> {
-        let chord: Space = [0, 1, 2].map(|k| d[k] - o[k]);
+        let chord = d - o;
         (0..=300)
             .map(|step| {
                 let t = f64::from(step) / 300.0;
-                let aside = offset(size(chord), p, n, t);
-                [0, 1, 2].map(|k| o[k] + chord[k] * t * t * (3.0 - 2.0 * t) + aside[k])
+                o + chord * t * t * (3.0 - 2.0 * t) + offset(chord.norm(), p, n, t)
             })
             .collect()
     }
@@ -270,13 +262,12 @@ mod tests {
             let mission = mission([takeoff(), item(0), item(1), item(2), item(3)]);
             let legs = crate::mission::legs(&mission, &Default::default()).unwrap().legs;
             let place = |k: usize| {
-                let [north, east] = vector(at(0, 0), at(places[k].0, places[k].1));
-                [north, east, f64::from(places[k].2)]
+                let ground = vector(at(0, 0), at(places[k].0, places[k].1));
+                ground.push(f64::from(places[k].2))
             };
-            let minus = |a: Space, b: Space| [0, 1, 2].map(|k| a[k] - b[k]);
             // The middle leg, 1 to 2, with its neighbours 0 to 1 and 2 to 3.
             let (from, to) = (place(1), place(2));
-            prop_assume!(size(minus(to, from)) > 1.0);
+            prop_assume!((to - from).norm() > 1.0);
             let middle = legs
                 .iter()
                 .find(|leg| (leg.from.item, leg.to.item) == (Some(2), Some(3)))
@@ -286,16 +277,17 @@ mod tests {
                 prop_assert!(!kinds[2]);
                 return Ok(());
             };
-            let p = minus(if kinds[1] { to } else { from }, place(0));
-            let n = minus(place(3), if kinds[3] { from } else { to });
-            let line = Line::new((from[0], from[1]), (to[0], to[1]));
-            let (low, high) = (from[2].min(to[2]), from[2].max(to[2]));
-            for (p, n) in [(p, n), (p, [0.0; 3]), ([0.0; 3], n), (p.map(|x| 0.6 * x), n)] {
-                for [north, east, up] in flown(from, to, p, n) {
-                    let off = Euclidean.distance(&Point::new(north, east), &line);
+            let p = if kinds[1] { to } else { from } - place(0);
+            let n = place(3) - if kinds[3] { from } else { to };
+            let line = Line::new((from.x, from.y), (to.x, to.y));
+            let (low, high) = (from.z.min(to.z), from.z.max(to.z));
+            let none = Space::zeros();
+            for (p, n) in [(p, n), (p, none), (none, n), (p * 0.6, n)] {
+                for place in flown(from, to, p, n) {
+                    let off = Euclidean.distance(&Point::new(place.x, place.y), &line);
                     prop_assert!(off <= within.0, "{} of {}", off, within);
-                    prop_assert!(up <= high + overshoot.0 + 1e-6);
-                    prop_assert!(up >= low - overshoot.0 - 1e-6);
+                    prop_assert!(place.z <= high + overshoot.0 + 1e-6);
+                    prop_assert!(place.z >= low - overshoot.0 - 1e-6);
                 }
             }
             let general = spline_bound(&middle.from, &middle.to).unwrap();
@@ -322,9 +314,10 @@ mod tests {
     fn the_bound_of_a_spline_is_reached_but_for_its_one_per_cent() {
         let (from, to) = (end(0, 50.0), end(3, 50.0));
         let chord = ground_distance(&from, &to);
-        let [north, east, _] = offset(chord, [0.0, 9.0 * chord, 0.0], [0.0; 3], 1.0 / 3.0);
+        let start = Space::new(0.0, 9.0 * chord, 0.0);
+        let aside = offset(chord, start, Space::zeros(), 1.0 / 3.0).xy().norm();
         let bound = spline_bound(&from, &to).unwrap();
-        assert!((bound.0 / north.hypot(east) - 1.01).abs() < 1e-9);
+        assert!((bound.0 / aside - 1.01).abs() < 1e-9);
     }
 
     #[test]

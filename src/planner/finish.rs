@@ -1,6 +1,8 @@
 //! The finish: as few waypoints as needed, on the integers that the vehicle will fly, every edge
 //! judged once more against the unsimplified obstacles.
 
+use nalgebra::{Matrix2, Vector2};
+
 use super::leg_space::LegSpace;
 use super::polyline::{distance, length, turn};
 use crate::airspace::RegionId;
@@ -73,15 +75,13 @@ fn cut_corners(path: &mut Vec<Xy>, space: &LegSpace<'_>) {
 /// Where the edge `a`-`b`, lengthened beyond `b`, meets `d`-`c`, lengthened beyond `c`: the
 /// solution of `a + t (b − a) = d + s (c − d)` with `t, s > 1`.
 fn meeting_point(a: Xy, b: Xy, c: Xy, d: Xy) -> Option<Xy> {
-    let cross = |p: Xy, q: Xy| p.x * q.y - p.y * q.x;
-    let (u, v, between) = (b - a, c - d, d - a);
-    let both = cross(u, v);
-    if both.abs() < PARALLEL * u.x.hypot(u.y) * v.x.hypot(v.y) {
+    let vector = |from: Xy, to: Xy| Vector2::new(to.x - from.x, to.y - from.y);
+    let (u, v) = (vector(a, b), vector(d, c));
+    if u.perp(&v).abs() < PARALLEL * u.norm() * v.norm() {
         return None;
     }
-    // Cramer's rule; NaN, where an edge has no length, is above nothing.
-    let (t, s) = (cross(between, v) / both, cross(between, u) / both);
-    (t > 1.0 && s > 1.0).then(|| a + u * t)
+    let shares = Matrix2::from_columns(&[u, -v]).lu().solve(&vector(a, d))?;
+    (shares.x > 1.0 && shares.y > 1.0).then(|| a + (b - a) * shares.x)
 }
 
 /// A finished path: what the vehicle will fly.
