@@ -9,7 +9,7 @@ PACKAGES := cmake g++ make pkg-config sqlite3 libsqlite3-dev python3-venv system
 
 TOOLS := target/tools
 
-.PHONY: all build demo ibm-demo faults deb test-deb soak companions daemon-figures test test-rust test-python test-ibm lint doc \
+.PHONY: all build demo ibm-demo faults deb test-deb test-unit soak companions daemon-figures test test-rust test-python test-ibm lint doc \
 	bench bench-table bench-peers bench-link bench-ibm fuzz examples gallery reference clean system browser
 
 all: build
@@ -61,7 +61,7 @@ faults: build $(VENV)/.ready
 deb: build $(TOOLS)/bin/cargo-deb
 	rm -rf target/package
 	$(BIN) generate target/package
-	$(TOOLS)/bin/cargo-deb --no-build --no-strip --output target/debian/
+	$(TOOLS)/bin/cargo-deb --no-build --strip --output target/debian/
 
 $(TOOLS)/bin/cargo-deb:
 	$(CARGO) install cargo-deb --locked --root $(TOOLS)
@@ -69,6 +69,10 @@ $(TOOLS)/bin/cargo-deb:
 # Installs, runs and purges it on this machine, which has to be one that can be thrown away.
 test-deb: deb
 	systemd/test-deb target/debian/quavd_*.deb
+
+# The unit under a systemd of its own, in namespaces. As root.
+test-unit: build
+	systemd/test-unit $(BIN)
 
 # The daemon for an hour with everything that can happen to it; SOAK=MINUTES for another time.
 SOAK ?= 60

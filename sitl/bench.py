@@ -49,7 +49,8 @@ class Daemon:
         config = pathlib.Path(directory) / "quavd.toml"
         config.write_text(f'connect = "{url}"\nsystem = 1\n{more}\n')
         self.log = open(pathlib.Path(directory) / "quavd.log", "w")
-        environment = {"PATH": os.environ["PATH"], "STATE_DIRECTORY": str(self.state)}
+        # What the unit sets as well.
+        environment = {"PATH": os.environ["PATH"], "STATE_DIRECTORY": str(self.state), "MALLOC_ARENA_MAX": "2"}
         if "RUST_LOG" in os.environ:
             environment["RUST_LOG"] = os.environ["RUST_LOG"]
         self.process = subprocess.Popen([self.quavd, "run", "--config", str(config)],

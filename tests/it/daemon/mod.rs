@@ -6,6 +6,7 @@ mod links;
 mod planning;
 mod qpu;
 mod service;
+mod soak;
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
