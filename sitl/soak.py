@@ -52,7 +52,7 @@ class Soak:
         event = self.dice.choices(
             [self.edit, self.upload, self.abandon, self.fence, self.upload_fence, self.reboot, self.silence,
              self.arm, self.loss],
-            weights=[4, 4, 1, 2, 1, 1, 1, 1, 1])[0]
+            weights=[6, 4, 1, 2, 1, 1, 1, 1, 1])[0]
         self.counts[event.__name__] = self.counts.get(event.__name__, 0) + 1
         event()
         if self.dice.random() < 0.5:
