@@ -14,6 +14,10 @@ const CHORD: f64 = 0.05;
 /// Made up for the grid that the overlay rounds to, metres.
 const GRID: f64 = 1e-3;
 
+/// How far a polygon that stands for a circle may be from it, metres: less than what a proof
+/// leaves for rounding.
+const ROUND: f64 = 5e-3;
+
 /// A region grown (an obstacle) or shrunk (an inclusion) by `margin` metres. An inclusion that
 /// is too narrow for the margin gives no polygon, one with a waist several.
 #[must_use]
@@ -51,12 +55,18 @@ fn rounded(margin: f64) -> BufferStyle<f64> {
     BufferStyle::new(margin / CHORD.cos() + GRID).line_join(LineJoin::Round(CHORD))
 }
 
+/// So many sides that a regular polygon is nowhere further than [`ROUND`] from its circle.
+pub(super) fn sides(radius: f64) -> u32 {
+    let sides = std::f64::consts::PI / (2.0 * ROUND / radius).sqrt();
+    sides.ceil().clamp(16.0, 65_536.0) as u32
+}
+
 /// A regular polygon around (`outside`) or within a circle.
 fn disc(centre: Point, radius: f64, outside: bool) -> MultiPolygon {
     if radius <= 0.0 {
         return MultiPolygon::new(Vec::new());
     }
-    let sides = 64;
+    let sides = sides(radius);
     let step = std::f64::consts::TAU / f64::from(sides);
     let reach = if outside { radius / (step / 2.0).cos() } else { radius };
     let rim = (0..sides).map(|i| {
@@ -73,6 +83,21 @@ mod tests {
 
     use super::*;
     use crate::geodesy::Xy;
+
+    #[test]
+    fn a_polygon_of_a_circle_of_any_size_is_next_to_it() {
+        for radius in [0.2, 5.0, 700.0, 50_000.0] {
+            let centre = Xy { x: 3.0, y: 4.0 };
+            let solid = Outline::SolidDisc { centre, radius };
+            let zone = Outline::ZoneDisc { centre, radius: radius + 10.0 };
+            for grown in [buffered(&solid, 5.0), buffered(&zone, 5.0)] {
+                for point in grown.iter().flat_map(|part| part.exterior().points()) {
+                    let off = Euclidean.distance(point, Point::from(centre)) - radius - 5.0;
+                    assert!(off.abs() < 0.01, "{radius} {off}");
+                }
+            }
+        }
+    }
 
     proptest! {
         #[test]

@@ -12,6 +12,7 @@
 pub mod barrier;
 pub mod buffered;
 pub mod outline;
+mod slabs;
 pub mod space;
 
 pub use outline::{AirspaceError, Outline, RegionProblem};

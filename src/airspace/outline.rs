@@ -225,11 +225,13 @@ pub fn edges(ring: &[Xy]) -> impl Iterator<Item = (Xy, Xy)> {
 /// Whether a point is inside a ring by the even-odd rule. On the edge, either answer.
 #[must_use]
 pub fn contains(ring: &[Xy], point: Xy) -> bool {
-    edges(ring).fold(false, |inside, (a, b)| {
-        let crosses = (a.y > point.y) != (b.y > point.y)
-            && point.x < (b.x - a.x) * (point.y - a.y) / (b.y - a.y) + a.x;
-        inside != crosses
-    })
+    edges(ring).fold(false, |inside, (a, b)| inside != crosses_ahead(a, b, point))
+}
+
+/// Whether an edge crosses the ray from a point towards positive `x`.
+pub(super) fn crosses_ahead(a: Xy, b: Xy, point: Xy) -> bool {
+    (a.y > point.y) != (b.y > point.y)
+        && point.x < (b.x - a.x) * (point.y - a.y) / (b.y - a.y) + a.x
 }
 
 /// Whether no two edges meet but at the vertex that they share: a sweep over the edges in the

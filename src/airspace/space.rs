@@ -1,7 +1,7 @@
 //! The airspace of a leg: all regions as barriers, and the two questions a path asks of it, "how
 //! near does this segment come?" and "which region is it?".
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 
 use geo::{Line, MultiPolygon, Polygon, unary_union};
 use rstar::primitives::{GeomWithData, Rectangle};
@@ -9,6 +9,7 @@ use rstar::{AABB, RTree};
 
 use super::barrier::{Barrier, BarrierIndex, BarrierShape};
 use super::outline::{AirspaceError, Outline, RegionProblem, contains, edges, outline};
+use super::slabs::Slabs;
 use crate::fence::{FenceRegion, FenceRole, FenceSet, InclusionRule};
 use crate::geodesy::{LocalFrame, Xy};
 
@@ -31,10 +32,6 @@ pub enum Boundary {
     },
 }
 
-/// The number of sides of a polygon that stands for an inclusion circle in a union. It is
-/// inscribed: nothing outside the circle is allowed.
-const CIRCLE_SIDES: u32 = 256;
-
 /// The bounding box of one ring of an obstacle: its region, and which of the region's rings.
 type SolidBox = GeomWithData<Rectangle<[f64; 2]>, (RegionId, usize)>;
 
@@ -44,6 +41,8 @@ pub struct Airspace {
     outlines: Vec<Outline>,
     barriers: BarrierIndex,
     solids: RTree<SolidBox>,
+    /// Of rings with many vertices, by their region and which of its rings they are.
+    slabs: HashMap<(RegionId, usize), Slabs>,
     /// With [`InclusionRule::Any`]: the union of the inclusions, where there are several, and the
     /// first of them.
     union: Option<(MultiPolygon, RegionId)>,
@@ -124,6 +123,7 @@ impl Airspace {
         let mut space = Self {
             barriers: BarrierIndex::new(Vec::new()),
             solids: RTree::bulk_load(solid_boxes(&outlines)),
+            slabs: slabs(&outlines),
             outlines,
             union,
             zones,
@@ -312,7 +312,7 @@ impl Airspace {
         for entry in self.solids.locate_in_envelope_intersecting(&here) {
             let (region, ring) = entry.data;
             if let Outline::Solid(rings) = &self.outlines[region.0 as usize]
-                && contains(&rings[ring], point)
+                && self.ring_contains(region, ring, &rings[ring], point)
             {
                 return Some(region);
             }
@@ -327,10 +327,32 @@ impl Airspace {
             }
         }
         self.zones.iter().copied().find(|region| match &self.outlines[region.0 as usize] {
-            Outline::Zone(ring) => !contains(ring, point),
+            Outline::Zone(ring) => !self.ring_contains(*region, 0, ring, point),
             _ => false,
         })
     }
+
+    fn ring_contains(&self, region: RegionId, number: usize, ring: &[Xy], point: Xy) -> bool {
+        match self.slabs.get(&(region, number)) {
+            Some(slabs) => slabs.contain(point),
+            None => contains(ring, point),
+        }
+    }
+}
+
+fn slabs(outlines: &[Outline]) -> HashMap<(RegionId, usize), Slabs> {
+    let mut found = HashMap::new();
+    for (id, outline) in regions(outlines) {
+        let rings = match outline {
+            Outline::Solid(rings) => rings.as_slice(),
+            Outline::Zone(ring) => std::slice::from_ref(ring),
+            Outline::SolidDisc { .. } | Outline::ZoneDisc { .. } => &[],
+        };
+        for (number, ring) in rings.iter().enumerate() {
+            found.extend(Slabs::of(ring).map(|slabs| ((id, number), slabs)));
+        }
+    }
+    found
 }
 
 fn regions(outlines: &[Outline]) -> impl Iterator<Item = (RegionId, &Outline)> {
@@ -371,8 +393,10 @@ fn zone_polygons(outlines: &[Outline], zones: &[RegionId]) -> Vec<Polygon> {
         .filter_map(|id| match &outlines[id.0 as usize] {
             Outline::Zone(ring) => Some(Polygon::new(ring.iter().copied().collect(), vec![])),
             Outline::ZoneDisc { centre, radius } => {
-                let rim = (0..CIRCLE_SIDES).map(|i| {
-                    let angle = std::f64::consts::TAU * f64::from(i) / f64::from(CIRCLE_SIDES);
+                // Inscribed: nothing outside the circle is allowed.
+                let sides = super::buffered::sides(*radius);
+                let rim = (0..sides).map(|i| {
+                    let angle = std::f64::consts::TAU * f64::from(i) / f64::from(sides);
                     *centre + Xy { x: angle.cos(), y: angle.sin() } * *radius
                 });
                 Some(Polygon::new(rim.collect(), vec![]))

@@ -25,6 +25,10 @@ const FINEST: f64 = COARSE / 16.0;
 /// How far the tangents of a run of shallow corners may stand out from it, metres.
 const RUN_HEIGHT: f64 = 0.3;
 
+/// Dents narrower than this share of the margin are no place for corners: a path that keeps the
+/// margin from both their rims comes in by a fiftieth of it at most.
+const NARROW: f64 = 0.4;
+
 /// What corners keep beyond the margin, metres: their edges would else just touch it, and be
 /// clear or not as the last bit of a rounding has it.
 const BEYOND: f64 = 1e-3;
@@ -130,6 +134,7 @@ impl Arc {
 /// The convex turns of a ring whose forbidden side is on the left. Runs of shallow corners (a
 /// polygon that stands for a curve) are taken as one turn while their tangents stay close.
 fn ring_arcs(ring: &[Xy], margin: f64, region: RegionId) -> Vec<Arc> {
+    let ring = &without_dents(ring, NARROW * margin);
     let n = ring.len();
     let direction = |i: usize| {
         let edge = ring[(i + 1) % n] - ring[i % n];
@@ -175,9 +180,41 @@ fn ring_arcs(ring: &[Xy], margin: f64, region: RegionId) -> Vec<Arc> {
     arcs
 }
 
+/// A ring without the vertices of dents whose rims are nearer to each other than `narrow`
+/// metres: a coast of a thousand vertices has no more corners than it has headlands.
+fn without_dents(ring: &[Xy], narrow: f64) -> Vec<Xy> {
+    let mut kept: Vec<Xy> = Vec::with_capacity(ring.len());
+    for &vertex in ring {
+        while let [.., rim, dent] = kept[..]
+            && cross(dent - rim, vertex - dent) <= 0.0
+            && distance(rim, vertex) < narrow
+        {
+            kept.pop();
+        }
+        kept.push(vertex);
+    }
+    if kept.len() < 3 { ring.to_vec() } else { kept }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn narrow_dents_have_no_corners_and_wide_ones_have() {
+        let toothed = |width: f64| -> Vec<Xy> {
+            let mut ring: Vec<Xy> = (0..20)
+                .flat_map(|k| {
+                    let x = f64::from(k) * width;
+                    [Xy { x, y: 0.0 }, Xy { x: x + width / 2.0, y: 1.0 }]
+                })
+                .collect();
+            ring.extend([Xy { x: 20.0 * width, y: 50.0 }, Xy { x: 0.0, y: 50.0 }]);
+            ring
+        };
+        assert!(ring_arcs(&toothed(1.0), 5.0, RegionId(0)).len() <= 5);
+        assert!(ring_arcs(&toothed(6.0), 5.0, RegionId(0)).len() > 20);
+    }
 
     #[test]
     fn a_square_is_rounded_at_its_four_corners_with_the_obstacle_on_the_left() {
