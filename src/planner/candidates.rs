@@ -6,6 +6,7 @@ use geo::Line;
 use serde::Serialize;
 
 use super::corners::{COARSE, FINE};
+use super::enclosure::{Enclosure, enclosure};
 use super::finish::{WORTH_OF_FEW, with_few_corners};
 use super::grid::GridSearch;
 use super::homotopy::passes_differently;
@@ -73,30 +74,43 @@ impl Candidate {
 /// then the best ones that are shut out of a gap of a better one; with `Grid` (the paper) paths
 /// over the grid only. As in the paper, the straight line is a candidate although it may collide.
 /// When stopped it is what was found until then.
-#[must_use]
+///
+/// # Errors
+/// The proof that there is no way, where there is one.
 pub fn candidates(
     space: &LegSpace<'_>,
     start: Xy,
     goal: Xy,
     settings: &Settings,
     stop: &Stop,
-) -> Vec<Candidate> {
+) -> Result<Vec<Candidate>, Enclosure> {
     let mut found: Vec<Candidate> = Vec::new();
     let wanted = settings.candidates.max(1);
+    let mut asked_for_a_proof = false;
+    let mut no_way = |found: &[Candidate]| {
+        let clear = found.iter().any(|candidate| candidate.clear);
+        if clear || stop.is_stopped() || std::mem::replace(&mut asked_for_a_proof, true) {
+            return Ok(());
+        }
+        enclosure(space, start, goal).map_or(Ok(()), Err)
+    };
     if settings.source.uses_corners() {
         let mut search = CornerSearch::new(*space, start, goal, COARSE, stop);
         for path in different_ways(&mut search, space, wanted) {
             let points = with_corners_that_fit(&path.points, space, settings.qubits);
             found.push(Candidate::new(points, Source::Corners, space));
         }
+        // A proof is quicker than a grid.
+        no_way(&found)?;
     }
     if settings.source.uses_grid() || found.is_empty() {
         let more = wanted.saturating_sub(found.len()).max(1);
         found.extend(grid_candidates(space, start, goal, settings, more, stop));
+        no_way(&found)?;
     }
     found.sort_by(|a, b| b.clear.cmp(&a.clear).then(a.length.total_cmp(&b.length)));
     found.push(Candidate::new(vec![start, goal], Source::Straight, space));
-    found
+    Ok(found)
 }
 
 /// Different paths over the grid, pulled taut where the next point but one is in sight. Where the

@@ -4,9 +4,9 @@
 //! what is found free is a superset of the free space. If start and goal are not connected in
 //! the superset, no path exists at any grid size.
 
-use geo::{
-    BooleanOps, BoundingRect, Intersects, Line, MultiPolygon, Point, Polygon, Rect, unary_union,
-};
+use std::collections::BTreeSet;
+
+use geo::{Area, BooleanOps, Intersects, Line, MultiPolygon, Point, Polygon, Rect, unary_union};
 
 use super::leg_space::LegSpace;
 use crate::airspace::buffered::{buffered, shrunk_union};
@@ -29,50 +29,111 @@ pub struct Enclosure {
     pub regions: Vec<RegionId>,
 }
 
+/// How far around an end the first look reaches, in margins; each further one reaches twice as
+/// far.
+const FIRST_LOOK: f64 = 64.0;
+
+/// Room around everything in which a path could go round the outside, metres.
+const OUTSIDE: f64 = 1000.0;
+
+/// A part of the free space this near to the edge of what was looked at may go on beyond it,
+/// metres.
+const AT_THE_EDGE: f64 = 1e-2;
+
 /// Looks for a proof that no path leads from start to goal; `None` where there is none.
+///
+/// What shuts an end in is mostly near to it: first only what lies around the ends is looked at,
+/// then twice as far, and at last everything.
 #[must_use]
 pub fn enclosure(space: &LegSpace<'_>, start: Xy, goal: Xy) -> Option<Enclosure> {
     let margin = space.margin() * SHARE - LESS;
     if margin <= 0.0 {
         return None;
     }
-    let outlines = space.airspace().outlines();
-    let grown: Vec<Polygon> = outlines
-        .iter()
-        .filter(|outline| matches!(outline, Outline::Solid(_) | Outline::SolidDisc { .. }))
-        .flat_map(|outline| buffered(outline, margin))
-        .collect();
-    let forbidden = unary_union(&grown);
-    let mut room = surroundings(&forbidden, start, goal);
-    if let Some(union) = space.airspace().union() {
-        room = room.intersection(&shrunk_union(union, margin));
+    let zones = room_of_zones(space, margin);
+    let all = surroundings(space, start, goal);
+    let mut reach = FIRST_LOOK * margin;
+    while reach < all.width().max(all.height()) {
+        for (end, other, goal) in [(goal, start, true), (start, goal, false)] {
+            let off = Xy { x: reach, y: reach };
+            let look = Rect::new(end - off, end + off);
+            let free = free(space, margin, look, zones.as_ref());
+            let part = free.0.into_iter().find(|part| part.intersects(&Point::from(end)));
+            if let Some(part) = part
+                && !part.intersects(&Point::from(other))
+                && part.exterior().coords().all(|&corner| is_within(corner, &look))
+            {
+                return Some(Enclosure { goal, regions: along_the_edge(space, &part, end) });
+            }
+        }
+        reach *= 2.0;
     }
-    for zone in space.airspace().zones() {
-        room = room.intersection(&buffered(zone, margin));
-    }
-    let free = room.difference(&forbidden);
+
+    let free = free(space, margin, all, zones.as_ref());
     let part_of = |point: Xy| free.iter().position(|part| part.intersects(&Point::from(point)));
     let (from, to) = (part_of(start)?, part_of(goal)?);
     if from == to {
         return None;
     }
     // The smaller part is the one that is shut in.
-    use geo::Area;
     let goal_is_in = free.0[to].unsigned_area() < free.0[from].unsigned_area();
     let (part, inside) = if goal_is_in { (to, goal) } else { (from, start) };
     Some(Enclosure { goal: goal_is_in, regions: along_the_edge(space, &free.0[part], inside) })
 }
 
+/// What of a box is free to fly in, `margin` metres away from everything.
+fn free(
+    space: &LegSpace<'_>,
+    margin: f64,
+    look: Rect,
+    zones: Option<&MultiPolygon>,
+) -> MultiPolygon {
+    let airspace = space.airspace();
+    let beyond = Xy { x: margin, y: margin };
+    let near: BTreeSet<RegionId> = airspace
+        .obstacles_in(look.min() - beyond, look.max() + beyond)
+        .map(|(region, _)| region)
+        .collect();
+    let grown: Vec<Polygon> = near
+        .iter()
+        .flat_map(|region| buffered(&airspace.outlines()[region.0 as usize], margin))
+        .collect();
+    let room = MultiPolygon::new(vec![look.to_polygon()]);
+    let room = zones.map_or_else(|| room.clone(), |zones| room.intersection(zones));
+    room.difference(&unary_union(&grown))
+}
+
+/// What the inclusions leave, where there are any.
+fn room_of_zones(space: &LegSpace<'_>, margin: f64) -> Option<MultiPolygon> {
+    let union = space.airspace().union().map(|union| shrunk_union(union, margin));
+    let zones = space.airspace().zones().map(|zone| buffered(zone, margin));
+    union.into_iter().chain(zones).reduce(|room, zone| room.intersection(&zone))
+}
+
+/// Whether a point lies in a box, and not next to its edge.
+fn is_within(point: Xy, look: &Rect) -> bool {
+    let (low, high) = (point - look.min(), look.max() - point);
+    low.x.min(low.y).min(high.x).min(high.y) > AT_THE_EDGE
+}
+
 /// A box around everything, in which a path could go round the outside of all obstacles.
-fn surroundings(forbidden: &MultiPolygon, start: Xy, goal: Xy) -> MultiPolygon {
+fn surroundings(space: &LegSpace<'_>, start: Xy, goal: Xy) -> Rect {
     let around = Rect::new(start, goal);
     let (mut low, mut high) = (around.min(), around.max());
-    if let Some(rect) = forbidden.bounding_rect() {
-        low = Xy { x: low.x.min(rect.min().x), y: low.y.min(rect.min().y) };
-        high = Xy { x: high.x.max(rect.max().x), y: high.y.max(rect.max().y) };
+    let mut add = |point: Xy, radius: f64| {
+        low = Xy { x: low.x.min(point.x - radius), y: low.y.min(point.y - radius) };
+        high = Xy { x: high.x.max(point.x + radius), y: high.y.max(point.y + radius) };
+    };
+    for outline in space.airspace().outlines() {
+        match outline {
+            Outline::Solid(rings) => rings.iter().flatten().for_each(|&point| add(point, 0.0)),
+            Outline::SolidDisc { centre, radius } => add(*centre, *radius),
+            // No path goes beyond these.
+            Outline::Zone(_) | Outline::ZoneDisc { .. } => {}
+        }
     }
-    let border = Xy { x: 1000.0, y: 1000.0 };
-    MultiPolygon::new(vec![Rect::new(low - border, high + border).to_polygon()])
+    let border = OUTSIDE + space.margin();
+    Rect::new(low - Xy { x: border, y: border }, high + Xy { x: border, y: border })
 }
 
 /// The regions within reach of a part's outline, by their distance from the point inside.

@@ -3,11 +3,11 @@
 use std::time::{Duration, Instant};
 
 use super::candidates::{Candidate, candidates};
-use super::enclosure::enclosure;
 use super::finish::{FinishError, Finished, finished, with_few_corners};
 use super::leg_space::LegSpace;
 use super::polyline::distance;
-use super::rounds::{Contest, Contested, Round, RoundError};
+use super::round::Round;
+use super::rounds::{Contest, Contested, RoundError};
 use super::settings::Settings;
 use super::trellis::EdgeJudge;
 use crate::airspace::RegionId;
@@ -180,13 +180,11 @@ impl LegPlanner {
 
         let space = &space.with_edges_up_to(straight);
         let began = Instant::now();
-        let found = candidates(space, start, goal, &self.settings, stop);
+        let found = candidates(space, start, goal, &self.settings, stop)
+            .map_err(|proof| PlanError::Infeasible { goal: proof.goal, regions: proof.regions })?;
         let mut times = LegTimes { candidates: began.elapsed(), ..LegTimes::default() };
         if !found.iter().any(|candidate| candidate.clear) {
             stop.check()?;
-            if let Some(proof) = enclosure(space, start, goal) {
-                return Err(PlanError::Infeasible { goal: proof.goal, regions: proof.regions });
-            }
         }
 
         let began = Instant::now();
