@@ -29,7 +29,7 @@ const MOST_MOVES: usize = 10;
 /// Moves that change the cost by less than this share of the best gain wait for a later round,
 /// and so do those that would lose more than the gain the other way round: next to moves that
 /// matter so much more (or less) QAOA could not tell whether to take them.
-const TELLING: f64 = 1.0 / 6.0;
+const TELLING: f64 = 1.0 / 3.0;
 
 /// The incumbent's corners, and where the challenger has them.
 #[derive(Debug, Clone, PartialEq)]

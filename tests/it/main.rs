@@ -5,6 +5,7 @@
 
 mod bad_links;
 mod campaign;
+mod certificates;
 mod commands;
 mod compare;
 mod daemon;
