@@ -15,7 +15,6 @@ mod scene;
 use std::time::{Duration, Instant};
 
 use quav::airspace::Airspace;
-use quav::fence::InclusionRule;
 use quav::geodesy::{LatLonE7, LocalFrame, Zone};
 use quav::planner::leg::LegRequest;
 use quav::planner::leg_space::LegSpace;
@@ -24,6 +23,10 @@ use quav::stop::Stop;
 
 use generate::BUFFER;
 use scene::{Known, Scene};
+
+/// What a passage may be wider or narrower than needed on each side while nothing is promised
+/// about it, metres: positions are rounded, and a proof leaves a little room.
+const DOUBT: f64 = 0.05;
 
 /// What came of a scene.
 struct Report {
@@ -44,7 +47,7 @@ fn plan(
     let (from, to) = scene.ends();
     let (a, b) = (from.to_degrees().unwrap(), to.to_degrees().unwrap());
     let frame = LocalFrame::new(Zone::of_leg(a, b), a).unwrap();
-    let airspace = Airspace::new(&scene.fences(), &frame, InclusionRule::All).unwrap();
+    let airspace = Airspace::new(&scene.fences(), &frame, scene.rule).unwrap();
     let spread = frame.scale_spread([&a, &b]).unwrap();
     let latitude = if a.lat().abs() > b.lat().abs() { a.lat() } else { b.lat() };
     let space = LegSpace::new(&airspace, settings.buffer.0 * spread, latitude);
@@ -108,6 +111,10 @@ fn judged(scene: &Scene, settings: Settings) -> Result<Report, String> {
                 return Err(format!("{name}: a path exists, but an end was refused"));
             }
         }
+        // Hardly wide enough, or hardly too narrow: neither a way nor a proof is promised.
+        Err(PlanError::NotFound { .. })
+            if oracle::shortest(scene, BUFFER + DOUBT, None).is_none()
+                && oracle::shortest(scene, BUFFER - DOUBT, None).is_some() => {}
         Err(error) => {
             let exact = oracle::shortest(scene, BUFFER, None);
             return Err(format!("{name}: {error}: {error:?}; the oracle says {exact:?}"));
@@ -145,13 +152,14 @@ macro_rules! families {
         )*
 
         fn all_families() -> Vec<(&'static str, fn(u64) -> Scene)> {
-            vec![$((stringify!($test), $what)),*]
+            let quick = [$((stringify!($test), $what as fn(u64) -> Scene)),*];
+            quick.into_iter().chain(slow_families()).collect()
         }
     };
 }
 
 families! {
-    small_urban_scenes_are_solved, |s| generate::urban(10 + 7 * s as usize, s), 0..8;
+    small_urban_scenes_are_solved, |s| generate::urban(10 + 7 * (s % 13) as usize, s), 0..8;
     urban_scenes_of_a_hundred_obstacles_are_solved, |s| generate::urban(100, s), 0..3;
     corridors_barely_wider_than_two_buffers_are_flown, generate::corridor, 0..10;
     mazes_are_solved, generate::maze, 0..8;
@@ -164,8 +172,17 @@ families! {
     heaps_of_overlapping_shapes_are_passed, generate::heaps, 0..10;
     combs_are_threaded, generate::combs, 0..6;
     gates_barely_wide_enough_are_found, generate::gate, 0..6;
+    doubtful_gates_are_passed_or_proven_shut, generate::doubtful_gate, 0..12;
+    one_of_several_inclusions_is_enough, generate::unions, 0..12;
+    crowded_lots_are_crossed_or_proven_shut, generate::crowded_lot, 0..12;
+    sealed_yards_are_refused, generate::sealed_yard, 0..4;
     legs_of_twenty_kilometres_are_planned, generate::long_leg, 0..4;
     the_infeasible_is_refused, generate::infeasible, 0..24;
+}
+
+/// What takes the oracle too long for every day.
+fn slow_families() -> [(&'static str, fn(u64) -> Scene); 2] {
+    [("large_mazes", generate::large_maze), ("countryside", generate::countryside)]
 }
 
 #[test]
@@ -215,6 +232,9 @@ fn campaign() {
         }
         let mean = ratios.iter().sum::<f64>() / ratios.len().max(1) as f64;
         let worst = ratios.iter().copied().fold(0.0, f64::max);
+        if worst > 1.02 || mean > 1.005 {
+            wrong.push(format!("{family}: mean {mean:.5} worst {worst:.5}"));
+        }
         println!(
             "{family}: solved {} refused {refused} mean {mean:.5} worst {worst:.5} waypoints \
              {waypoints} rounds {rounds} optimum hit {:.3} time {:?} slowest {slowest:?}",

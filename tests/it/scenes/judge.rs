@@ -19,9 +19,8 @@ const POLAR: f64 = 85.0;
 /// How near a path comes to any region's edge, metres; 0 on a wrong side.
 pub(crate) fn clearance(scene: &Scene, path: &[LatLonE7]) -> f64 {
     let ground = scene.ground();
-    let regions: Vec<(bool, Vec<LatLon>, f64)> = scene
-        .regions
-        .iter()
+    let judged = scene.regions.iter().filter(|region| !(region.inclusion && scene.is_union()));
+    let regions: Vec<(bool, Vec<LatLon>, f64)> = judged
         .map(|region| match &region.shape {
             Shape::Ring(ring) => {
                 let ring = ring.iter().map(|&p| ground.position(p)).collect();
@@ -32,12 +31,30 @@ pub(crate) fn clearance(scene: &Scene, path: &[LatLonE7]) -> f64 {
             }
         })
         .collect();
-    path.windows(2)
+    let kept = path
+        .windows(2)
         .map(|edge| {
             let (a, b) = (edge[0].to_degrees().unwrap(), edge[1].to_degrees().unwrap());
             edge_clearance(a, b, &regions)
         })
-        .fold(f64::INFINITY, f64::min)
+        .fold(f64::INFINITY, f64::min);
+    if scene.is_union() { kept.min(union_clearance(scene, path)) } else { kept }
+}
+
+/// The same from the edge of all inclusions together, on the scene's own map: these scenes are
+/// small.
+fn union_clearance(scene: &Scene, path: &[LatLonE7]) -> f64 {
+    let ground = scene.ground();
+    let flown: Vec<P> = path.iter().map(|place| ground.xy(place.to_degrees().unwrap())).collect();
+    if !scene.zones().iter().any(|zone| inside(flown[0], zone)) {
+        return 0.0;
+    }
+    let (walls, _) = scene.union_edge();
+    let apart = |way: &[P]| {
+        let nearest = walls.iter().map(|&(a, b)| segment_to_segment(way[0], way[1], a, b));
+        nearest.fold(f64::INFINITY, f64::min)
+    };
+    flown.windows(2).map(apart).fold(f64::INFINITY, f64::min)
 }
 
 fn edge_clearance(a: LatLon, b: LatLon, regions: &[(bool, Vec<LatLon>, f64)]) -> f64 {

@@ -16,8 +16,13 @@ const STEP: f64 = 0.06;
 /// there is none. With `bound`, only paths up to that length are looked for.
 pub(crate) fn shortest(scene: &Scene, margin: f64, bound: Option<f64>) -> Option<f64> {
     let walls = Walls::new(scene.walls(), margin);
+    let zones = scene.zones();
     let in_zones = |p: P| {
+        if scene.is_union() && !zones.iter().any(|zone| inside(p, zone)) {
+            return false;
+        }
         scene.regions.iter().all(|region| match &region.shape {
+            _ if region.inclusion && scene.is_union() => true,
             Shape::Disc(centre, radius) if region.inclusion => dist(p, *centre) <= radius - margin,
             Shape::Ring(ring) if region.inclusion => inside(p, ring),
             Shape::Ring(ring) => !inside(p, ring),
@@ -75,6 +80,12 @@ fn bends(scene: &Scene, margin: f64) -> Vec<P> {
             points.push(add(centre, mul(out, reach)));
         }
     };
+    if scene.is_union() {
+        // Where two zones meet their edge may stick out into the room.
+        for meeting in scene.union_edge().1 {
+            arc(meeting, margin, [1.0, 0.0], std::f64::consts::TAU);
+        }
+    }
     for region in &scene.regions {
         match &region.shape {
             Shape::Disc(..) if region.inclusion => {}

@@ -55,6 +55,14 @@ pub(crate) fn segment_to_segment(a: P, b: P, c: P, d: P) -> f64 {
     .fold(f64::INFINITY, f64::min)
 }
 
+/// Where `a`-`b` crosses `c`-`d`, as a share of `a`-`b`.
+pub(crate) fn crossing(a: P, b: P, c: P, d: P) -> Option<f64> {
+    let (u, v) = (sub(b, a), sub(d, c));
+    let across = cross(u, v);
+    let (t, s) = (cross(sub(c, a), v) / across, cross(sub(c, a), u) / across);
+    ((0.0..=1.0).contains(&t) && (0.0..=1.0).contains(&s)).then_some(t)
+}
+
 /// Even-odd.
 pub(crate) fn inside(p: P, ring: &[P]) -> bool {
     let mut result = false;
