@@ -6,11 +6,12 @@
 mod problems;
 
 use std::hint::black_box;
+use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 use std::time::{Duration, Instant};
 
 use clap::Parser;
-use problems::{LAYERS, MEMORY, chain, three_regular, town};
+use problems::{LAYERS, MEMORY, chain, hundred_legs, lakes, long_leg, three_regular, town};
 use quav::qaoa::Angles;
 use quav::qaoa::chain::ChainEngine;
 use quav::qaoa::engine::Engine;
@@ -51,12 +52,33 @@ fn rows() -> Vec<Row> {
     }
     rows.push(Row { what: "statevector f64 60 steps", size: 16, threads: 1 });
     rows.push(Row { what: "statevector f64 60 steps", size: 20, threads: 1 });
-    rows.extend([10, 100, 1000, 10_000].map(|size| Row {
-        what: "plan of obstacles",
-        size,
-        threads: 2,
-    }));
+    for (what, sizes) in PLANS {
+        rows.extend(sizes.iter().map(|&size| Row { what, size, threads: 2 }));
+    }
     rows
+}
+
+/// Whole plans, and how many obstacles they have.
+const PLANS: [(&str, &[usize]); 4] = [
+    ("plan of obstacles", &[10, 100, 1000, 10_000]),
+    ("plan of 20 km", &[1000, 10_000]),
+    ("plan of 1,000-vertex outlines", &[10, 20]),
+    ("plan of 100 legs", &[1000, 10_000]),
+];
+
+/// Where a row's plan is for its own process.
+fn plan_file(row: &Row) -> PathBuf {
+    let name = row.name().replace(|c: char| !c.is_ascii_alphanumeric(), "-");
+    std::env::temp_dir().join(format!("quavd-bench-{name}.plan"))
+}
+
+fn mission_of(row: &Row) -> serde_json::Value {
+    match row.what {
+        "plan of 20 km" => long_leg(row.size),
+        "plan of 1,000-vertex outlines" => lakes(row.size),
+        "plan of 100 legs" => hundred_legs(row.size),
+        _ => town(row.size),
+    }
 }
 
 /// The best time of at least three runs, and of as many as fit into a second.
@@ -127,9 +149,8 @@ fn peak() -> Option<f64> {
     Some(line.split_whitespace().nth(1)?.parse::<f64>().ok()? / 1024.0)
 }
 
-/// The whole of `quavd plan` on a town, in this process as in quavd's own.
-fn plan(obstacles: usize) -> ExitCode {
-    let path = std::env::temp_dir().join(format!("quavd-bench-{obstacles}.plan"));
+/// The whole of `quavd plan`, in this process as in quavd's own.
+fn plan(path: &Path) -> ExitCode {
     let out = path.with_extension("out.plan");
     let arguments =
         ["quavd", "--quiet", "plan", path.to_str().unwrap(), "--out", out.to_str().unwrap()];
@@ -141,7 +162,7 @@ fn own_process(name: &str) -> ExitCode {
     let row = rows().into_iter().find(|row| row.name() == name).unwrap();
     let began = Instant::now();
     let time = if row.what.starts_with("plan") {
-        if plan(row.size) != ExitCode::SUCCESS {
+        if plan(&plan_file(&row)) != ExitCode::SUCCESS {
             return ExitCode::FAILURE;
         }
         began.elapsed()
@@ -165,8 +186,7 @@ fn main() -> ExitCode {
             continue;
         }
         if row.what.starts_with("plan") {
-            let path = std::env::temp_dir().join(format!("quavd-bench-{}.plan", row.size));
-            std::fs::write(path, town(row.size).to_string()).unwrap();
+            std::fs::write(plan_file(&row), mission_of(&row).to_string()).unwrap();
         }
         let output = Command::new(&me)
             .env(ROW, row.name())
