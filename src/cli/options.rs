@@ -225,8 +225,8 @@ pub struct PlanningArgs {
     /// Distances and fences.
     #[command(flatten)]
     pub safety: SafetyArgs,
-    /// Edges of a leg's path, one qubit each. Legs with more corners get more; engines other than
-    /// chain then take them in windows of this many qubits.
+    /// Edges of a leg's path, one qubit each. Legs with more corners get more, and take them in
+    /// windows of this many qubits (but for refinements with the chain engine).
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u16).range(2..=2000))]
     pub qubits: u16,
     /// QAOA layers.

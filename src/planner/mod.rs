@@ -4,7 +4,7 @@
 //! - [`settings`]: the paper's table of settings and what may be changed;
 //! - [`leg_space`]: the airspace with the leg's margins;
 //! - [`polyline`]: lengths, turns, simplification;
-//! - [`corners`], `sweep`, [`search`]: shortest paths over the corners of obstacles;
+//! - [`corners`], `sweep`, `pass`, [`search`]: shortest paths over the corners of obstacles;
 //! - [`grid`]: the paper's candidate grid;
 //! - [`homotopy`]: whether two paths pass obstacles on different sides;
 //! - [`candidates`]: structurally different candidates from both;
@@ -12,6 +12,7 @@
 //! - [`trellis`]: two polylines as an Ising chain;
 //! - [`moves`]: challengers for refinement;
 //! - [`pair`]: two polylines as problems, in windows where need be;
+//! - [`round`]: the record of a round;
 //! - [`rounds`]: QAOA decides, round after round;
 //! - [`qpu_rounds`]: the same on a QPU, many to a job;
 //! - [`finish`]: few waypoints, on the integers that the vehicle flies;
@@ -30,8 +31,10 @@ pub mod leg;
 pub mod leg_space;
 pub mod moves;
 pub mod pair;
+mod pass;
 pub mod polyline;
 pub mod qpu_rounds;
+pub mod round;
 pub mod rounds;
 pub mod search;
 pub mod settings;

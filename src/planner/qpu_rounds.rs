@@ -11,9 +11,8 @@ use std::collections::VecDeque;
 use super::candidates::Candidate;
 use super::moves::moves;
 use super::pair::Pair;
-use super::rounds::{
-    Challenger, Contest, Contested, PROGRESS, PROPOSALS, QpuRound, Round, RoundError,
-};
+use super::round::{Challenger, QpuRound, Round};
+use super::rounds::{Contest, Contested, PROGRESS, PROPOSALS, RoundError};
 use super::settings::QpuTraining;
 use crate::geodesy::Xy;
 use crate::qaoa::qpu::{

@@ -10,8 +10,9 @@ use rand_chacha::ChaCha8Rng;
 use super::candidates::{Candidate, Source};
 use super::homotopy::passes_differently;
 use super::moves::moves;
-use super::pair::{Pair, Window};
+use super::pair::Pair;
 use super::polyline::{length, simplified};
+use super::round::{Challenger, QpuRound, Round};
 use super::settings::{Rounds, Settings};
 use super::stations::{Spare, aligned};
 use super::trellis::{EdgeJudge, Trellis};
@@ -22,77 +23,6 @@ use crate::qaoa::{
     RunSettings, Scale, Settled, TrainSettings,
 };
 use crate::stop::{Stop, Stopped};
-
-/// What challenged the incumbent in a round.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Challenger {
-    /// Another candidate.
-    Route,
-    /// The incumbent with its stations moved.
-    Refinement,
-}
-
-/// The record of one round. Energies are metres; a collision counts `penalty` in them.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Round {
-    /// What challenged.
-    pub challenger: Challenger,
-    /// The engine that ran.
-    pub engine: EngineKind,
-    /// Qubits of the circuit.
-    pub qubits: usize,
-    /// The part of a longer chain that these are, where the engine does not take all of it.
-    pub window: Option<Window>,
-    /// Layers of the circuit.
-    pub layers: usize,
-    /// What the training lowered.
-    pub objective: Objective,
-    /// Whether that was estimated from samples at every step.
-    pub loss_is_sampled: bool,
-    /// The objective at the start of the training and after each step.
-    pub loss: Vec<f64>,
-    /// Distinct bitstrings among the shots.
-    pub distinct: usize,
-    /// Energy of the cheapest sample.
-    pub best_sample: f64,
-    /// The chain's exact optimum.
-    pub exact_optimum: f64,
-    /// The difference of the two.
-    pub gap: f64,
-    /// The probability of the exact optimum in one shot.
-    pub p_optimum: f64,
-    /// The collision penalty `M` of this chain.
-    pub penalty: f64,
-    /// The incumbent after the round, local metres.
-    pub incumbent: Vec<Xy>,
-    /// Its length.
-    pub length: f64,
-    /// Whether the round replaced the incumbent.
-    pub improved: bool,
-    /// What a QPU measured, where one ran the circuit.
-    pub qpu: Option<QpuRound>,
-}
-
-/// What a QPU measured in a round. Energies are metres, as those of the [`Round`].
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct QpuRound {
-    /// The processor.
-    pub backend: String,
-    /// Where the angles were trained: on the QPU, or by the exact local engine.
-    pub trained_on: &'static str,
-    /// ⟨H⟩ of the shots with readout errors taken out.
-    pub expectation: f64,
-    /// ⟨H⟩ of the shots as they were read.
-    pub raw_expectation: f64,
-    /// The standard error of `expectation` from the number of shots.
-    pub standard_error: f64,
-    /// ⟨H⟩ of the circuit without errors, by the local engine.
-    pub ideal_expectation: f64,
-    /// The standard errors of the loss, where the QPU trained.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub loss_errors: Vec<f64>,
-}
 
 /// The better of staying and the cheapest sample of a round.
 pub(super) struct Decided {
@@ -317,8 +247,8 @@ impl<'a> Contest<'a> {
         self.settings.qubits + 1
     }
 
-    /// One round between two polylines with the same ends; where the engine does not take the whole
-    /// chain, one for each window, each with the bits that those before it have found.
+    /// One round between two polylines with the same ends; where the chain is too long for one, one
+    /// for each window, each with the bits that those before it have found.
     fn round(
         &mut self,
         kind: Challenger,
@@ -360,10 +290,14 @@ impl<'a> Contest<'a> {
             return Ok(Vec::new());
         };
         let trellis = Trellis::new(a, b, &self.judge);
-        let penalty = trellis.penalty();
-        let chain = trellis.ising(penalty)?;
-        let most = self.settings.engine.most_qubits(self.settings.qubits);
-        Ok(Pair::windows_of(kind, trellis, penalty, chain, most))
+        let few = self.settings.qubits;
+        let most = match kind {
+            // Two routes differ nearly everywhere: the more there is to decide at once, the less
+            // likely is it that a shot has all of it right.
+            Challenger::Route => few,
+            Challenger::Refinement => self.settings.engine.most_qubits(few),
+        };
+        Ok(Pair::windows_of(kind, &trellis, most)?)
     }
 
     /// Judges every sample of a run; the cheapest path is the incumbent if it is cheaper than staying

@@ -14,6 +14,7 @@ use rstar::{AABB, RTree};
 
 use super::corners::{Corner, corners};
 use super::leg_space::LegSpace;
+use super::pass::{GOAL, Offer, Pass, Reached, SAME, START, State};
 use super::polyline::{cross, distance, distance_to_edge, length};
 use super::sweep::{Cone, Sight, sweep};
 use crate::airspace::RegionId;
@@ -53,48 +54,6 @@ pub struct CornerPath {
 /// parts of a tight corner have no room, the points that are left turn further.
 const TANGENT_SLACK: f64 = 0.1;
 
-/// A corner as it is passed: twice its number, plus one with its boundary on the left.
-type State = u32;
-
-/// The numbers of the start and of the goal.
-const START: u32 = 0;
-const GOAL: u32 = 1;
-
-/// Paths are compared with this tolerance, metres.
-const SAME: f64 = 1e-9;
-
-/// An edge to try, ordered by the length of the shortest path that may use it.
-#[derive(Clone, Copy, PartialEq)]
-struct Offer {
-    estimate: f64,
-    so_far: f64,
-    from: State,
-    to: State,
-}
-
-impl Eq for Offer {}
-
-impl PartialOrd for Offer {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Offer {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.estimate
-            .total_cmp(&other.estimate)
-            .then_with(|| (self.to, self.from).cmp(&(other.to, other.from)))
-    }
-}
-
-/// How a state was reached.
-#[derive(Debug, Clone, Copy)]
-struct Reached {
-    so_far: f64,
-    from: State,
-}
-
 /// The first look at a leg may miss the shortest path by this factor; it takes a small part of
 /// the time, and nothing longer than what it finds is looked at again.
 const GLANCE: f64 = 1.05;
@@ -105,18 +64,6 @@ const PATIENCE: u32 = 8_000;
 
 /// How many windows a path is divided into; they overlap by half.
 const WINDOWS: usize = 8;
-
-/// One search: what was reached, and what is still to be tried.
-struct Pass {
-    /// How much the way that is left counts: above 1 the search is quicker and less exact.
-    weight: f64,
-    /// Places that may still be looked at.
-    patience: u32,
-    /// Longer paths are of no interest, metres.
-    bound: f64,
-    reached: Vec<Option<Reached>>,
-    open: BinaryHeap<Reverse<Offer>>,
-}
 
 impl<'a> CornerSearch<'a> {
     /// Prepares the search for a leg, with corners rounded by points `step` radians apart;
@@ -451,13 +398,6 @@ impl CornerPath {
     #[must_use]
     pub fn length(&self) -> f64 {
         length(&self.points)
-    }
-}
-
-impl Pass {
-    /// Whether reaching a state in `so_far` metres would be better than anything before.
-    fn is_news(&self, state: State, so_far: f64) -> bool {
-        self.reached[state as usize].is_none_or(|reached| so_far < reached.so_far - SAME)
     }
 }
 

@@ -6,6 +6,8 @@
 //! its ends are, so that the exact Hamiltonian also has the neighbour couplings that the paper's
 //! circuit applies (CNOT–RZ–CNOT, "Quantum-Assisted Optimization").
 
+use std::ops::Range;
+
 use super::leg_space::LegSpace;
 use super::polyline::distance;
 use crate::geodesy::Xy;
@@ -124,10 +126,10 @@ impl Trellis {
         })
     }
 
-    /// Whether none of the qubits in a range has anything to decide.
+    /// Whether a qubit has nothing to decide: the two polylines share its station.
     #[must_use]
-    pub fn is_idle(&self, mut qubits: std::ops::Range<usize>) -> bool {
-        qubits.all(|i| self.incumbent[i] == self.challenger[i])
+    pub fn is_idle(&self, qubit: usize) -> bool {
+        self.incumbent[qubit] == self.challenger[qubit]
     }
 
     /// The stations of the path that a bitstring stands for.
@@ -139,18 +141,34 @@ impl Trellis {
         self.incumbent.iter().zip(&self.challenger).enumerate().map(choose).collect()
     }
 
-    /// What a collision costs in the Hamiltonian: the smallest `M` that makes every colliding
-    /// path dearer than the cheapest clean one, capped so that the spectrum stays well
-    /// conditioned. (With the paper's 10⁶ every phase would wrap thousands of times.)
+    /// What a collision costs in the Hamiltonian of a window of qubits, those outside held: the
+    /// smallest `M` that makes every colliding path dearer than the cheapest clean one, capped so
+    /// that the spectrum stays well conditioned. (With the paper's 10⁶ every phase would wrap
+    /// thousands of times.)
     #[must_use]
-    pub fn penalty(&self) -> f64 {
-        // Dynamic programme over (bit, has collided): cheapest so far without the penalty.
-        let mut best = [[0.0, f64::INFINITY]; 2];
-        best[1] = best[0];
-        for (i, edge) in self.edges.iter().enumerate() {
+    pub fn penalty(&self, window: &Range<usize>, held: &Bits) -> f64 {
+        // Dynamic programme over (bit, has collided): cheapest so far without the penalty. It
+        // begins with the edge that leads into the window and ends with the one out of it.
+        let mut best = [[f64::INFINITY; 2]; 2];
+        let first = window.start.saturating_sub(1);
+        for (bit, best) in best.iter_mut().enumerate() {
+            if window.start == 0 || usize::from(held.get(first)) == bit {
+                best[0] = 0.0;
+            }
+        }
+        for i in first..window.end {
+            let edge = &self.edges[i];
+            let ends = match i + 1 {
+                next if next < window.end => 0..2,
+                next if next < self.edges.len() => {
+                    let bit = usize::from(held.get(next));
+                    bit..bit + 1
+                }
+                _ => 0..1,
+            };
             let mut next = [[f64::INFINITY; 2]; 2];
             for x in 0..2 {
-                for y in 0..if i + 1 < self.edges.len() { 2 } else { 1 } {
+                for y in ends.clone() {
                     for (collided, so_far) in best[x].iter().enumerate() {
                         let after = collided | usize::from(edge[x][y].collides);
                         let cost = so_far + edge[x][y].energy(0.0);
@@ -160,9 +178,10 @@ impl Trellis {
             }
             best = next;
         }
-        let [clean, colliding] = best[0];
-        let cap =
-            (PENALTY_CAP_SHARE * super::polyline::length(&self.incumbent)).max(LEAST_PENALTY_CAP);
+        let least = |collided: usize| best[0][collided].min(best[1][collided]);
+        let (clean, colliding) = (least(0), least(1));
+        let part = &self.incumbent[first..=window.end];
+        let cap = (PENALTY_CAP_SHARE * super::polyline::length(part)).max(LEAST_PENALTY_CAP);
         if !colliding.is_finite() {
             return 0.0;
         }
@@ -267,7 +286,8 @@ mod tests {
         #[test]
         fn below_its_cap_the_penalty_puts_a_clean_path_first((lengths, collisions) in costs()) {
             let trellis = trellis(&lengths, &collisions);
-            let penalty = trellis.penalty();
+            let n = lengths.len();
+            let penalty = trellis.penalty(&(0..n), &Bits::zeros(n));
             prop_assume!(penalty < LEAST_PENALTY_CAP);
             let cheapest = |clean: bool| {
                 all_bits(lengths.len())

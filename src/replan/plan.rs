@@ -13,7 +13,7 @@ use crate::mission::splice::SpliceNote;
 use crate::mission::{Detour, Leg, Mission, legs, splice};
 use crate::planner::candidates::Candidate;
 use crate::planner::leg::{LegRequest, LegTimes};
-use crate::planner::rounds::Round;
+use crate::planner::round::Round;
 use crate::planner::{LegOutcome, LegPlan, LegPlanner};
 use crate::qaoa::qpu::{Qpu, QpuUse};
 use crate::stop::Stop;

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use crate::mission::Leg;
 use crate::mission::legs::{LegKind, ReturnTo, number as item_number};
-use crate::planner::rounds::Round;
+use crate::planner::round::Round;
 use crate::replan::LegVerdict;
 use crate::units::Metres;
 

@@ -16,7 +16,7 @@ use crate::planner::Settings;
 use crate::planner::trellis::{EdgeJudge, Trellis};
 use crate::qaoa::chain::ChainEngine;
 use crate::qaoa::train::train;
-use crate::qaoa::{Angles, Ising, Scale, TrainSettings};
+use crate::qaoa::{Angles, Bits, Ising, Scale, TrainSettings};
 use crate::stop::Stop;
 use crate::units::Metres;
 
@@ -132,7 +132,9 @@ fn chain(start: Xy, goal: Xy, edges: usize, judge: &EdgeJudge<'_>) -> Result<Isi
         std::iter::once(start).chain(interior).chain([goal]).collect()
     };
     let trellis = Trellis::new(stations(&straight), stations(&bow), judge);
-    match trellis.ising(trellis.penalty()) {
+    let whole = 0..trellis.qubits();
+    let penalty = trellis.penalty(&whole, &Bits::zeros(trellis.qubits()));
+    match trellis.ising(penalty) {
         Ok(chain) => Ok(chain.into()),
         Err(error) => Err(CliError::Usage(error.to_string())),
     }

@@ -104,7 +104,7 @@ fn rule(from: (f64, f64), to: (f64, f64)) -> Line {
 mod tests {
     use super::*;
     use crate::cli::compare::measure::Measured;
-    use crate::planner::rounds::Challenger;
+    use crate::planner::round::Challenger;
 
     fn scenario(name: &str, loss: &[f64]) -> ScenarioResult {
         let round = RoundDocument {

@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::mission::legs::number as item_number;
 use crate::planner::candidates::{Candidate, Source};
 use crate::planner::pair::Window;
-use crate::planner::rounds::{Challenger, QpuRound, Round};
+use crate::planner::round::{Challenger, QpuRound, Round};
 use crate::replan::LegVerdict;
 use crate::report::stretch::Stretch;
 

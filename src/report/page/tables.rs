@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::html::table;
-use crate::planner::rounds::{Challenger, Round};
+use crate::planner::round::{Challenger, Round};
 use crate::replan::{LegRecord, Options, Replanned};
 use crate::report::json::{SettingsDocument, TimeDocument};
 use crate::report::stretch::{Stretch, stretches};

@@ -6,7 +6,7 @@ use svg::node::element::{Group, Path};
 use super::chart::{Axis, Chart};
 use super::text;
 use super::view::{Rect, px};
-use crate::planner::rounds::Round;
+use crate::planner::round::Round;
 use crate::replan::LegRecord;
 use crate::report::text::{count, leg_label};
 
