@@ -141,6 +141,9 @@ fn hold(scenes: impl IntoIterator<Item = Scene>) {
     assert!(ratios.iter().all(|ratio| ratio.0 > 0.9993), "{ratios:?}");
 }
 
+/// A kind of scenes: its name, and how one is made from a seed.
+type Family = (&'static str, fn(u64) -> Scene);
+
 macro_rules! families {
     ($($test:ident, $what:expr, $seeds:expr;)*) => {
         $(
@@ -151,7 +154,7 @@ macro_rules! families {
             }
         )*
 
-        fn all_families() -> Vec<(&'static str, fn(u64) -> Scene)> {
+        fn all_families() -> Vec<Family> {
             let quick = [$((stringify!($test), $what as fn(u64) -> Scene)),*];
             quick.into_iter().chain(slow_families()).collect()
         }
@@ -181,7 +184,7 @@ families! {
 }
 
 /// What takes the oracle too long for every day.
-fn slow_families() -> [(&'static str, fn(u64) -> Scene); 2] {
+fn slow_families() -> [Family; 2] {
     [("large_mazes", generate::large_maze), ("countryside", generate::countryside)]
 }
 
