@@ -336,6 +336,6 @@ mod tests {
     fn a_problem_too_large_for_the_machine_is_an_error_with_the_figure() {
         let problem = format!(r#"{{"h": {:?}, "J": [[0, 49, 1]]}}"#, vec![1.0; 50]);
         let error = with_problem(&problem, &[]).unwrap_err().to_string();
-        assert!(error.contains("needs 34359738384 MiB for 50 qubits"), "{error}");
+        assert!(error.contains("needs 34493956112 MiB for 50 qubits"), "{error}");
     }
 }
