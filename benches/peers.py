@@ -1,7 +1,7 @@
 """PennyLane's side of benches/peers.rs: reads one task (JSON) from stdin, runs it, prints its time.
 
 Without steps: <H> and its gradient, best of three. With steps: a whole training with PennyLane's own
-Adam; the loss before each step and after the last.
+Adam; the loss before each step and after the last, and the angles that it belongs to.
 """
 
 import json
@@ -63,13 +63,14 @@ def main():
         result = {"seconds": min(seconds), "energies": energies}
     else:
         adam = qml.AdamOptimizer(stepsize=0.1, beta2=0.999)
-        losses = []
+        losses, angles = [], [(gammas.tolist(), betas.tolist())]
         began = time.perf_counter()
         for _ in range(task["steps"]):
             (gammas, betas), loss = adam.step_and_cost(expectation, gammas, betas)
             losses.append(float(loss))
+            angles.append((gammas.tolist(), betas.tolist()))
         losses.append(float(expectation(gammas, betas)))
-        result = {"seconds": time.perf_counter() - began, "energies": losses}
+        result = {"seconds": time.perf_counter() - began, "energies": losses, "angles": angles}
     json.dump(result | {"versions": versions}, sys.stdout)
 
 
