@@ -87,7 +87,11 @@ fn judged(scene: &Scene, settings: Settings) -> Result<Report, String> {
     match outcome {
         Ok((path, plan)) => {
             if scene.known == Known::Infeasible {
-                return Err(format!("{name}: a path through the impossible"));
+                let kept = judge::clearance(scene, &path);
+                let apart = plane::dist(scene.start, scene.goal);
+                return Err(format!(
+                    "{name}: a path through the impossible, {kept} m clear, ends {apart} m apart"
+                ));
             }
             let kept = judge::clearance(scene, &path);
             if kept < BUFFER - 0.01 {

@@ -179,8 +179,12 @@ pub(crate) fn sealed_yard(seed: u64) -> Scene {
         made.regions.push(solid(placed(&square, centre, angle)));
     }
     made.name = format!("sealed-yard {seed}");
-    made.start = add(made.goal, rotated([2.0 * radius + 30.0, 0.0], rng.random_range(0.0..TAU)));
-    made.start = open_near(&made.regions, made.start, &mut rng);
+    // The nearest open place may be in the yard.
+    made.start = made.goal;
+    while dist(made.start, made.goal) < radius + size {
+        let away = rotated([2.0 * radius + 30.0, 0.0], rng.random_range(0.0..TAU));
+        made.start = open_near(&made.regions, add(made.goal, away), &mut rng);
+    }
     made.known = Known::Infeasible;
     made
 }
