@@ -91,10 +91,13 @@ def way(dump):
         home, items = degrees(items[0]), items[1:]
     elif dump.get("home"):
         home = (dump["home"]["lat"], dump["home"]["lon"])
+    stands = (dump["position"]["lat"], dump["position"]["lon"]) if dump.get("position") else None
     for item in items:
         command = item["command"]
         if command == TAKEOFF:
-            places.append(degrees(item) if item["x"] or item["y"] else home)
+            # ArduPilot takes off where it stands, whatever place the item has.
+            has_place = (item["x"] or item["y"]) and dump["persona"] != "ardupilot"
+            places.append(degrees(item) if has_place else stands or home)
         elif command == RTL:
             places.append(home)
         elif command == WAYPOINT or (command == LAND and (item["x"] or item["y"])):
