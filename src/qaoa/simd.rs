@@ -166,7 +166,7 @@ pub(super) fn run<K: Kernel>(kernel: K) -> K::Output {
             #[allow(unsafe_code)]
             return unsafe { x86::with_avx512(kernel) };
         }
-        if std::is_x86_feature_detected!("avx2") {
+        if has_avx2() {
             // SAFETY: the processor has just said that it has AVX2.
             #[allow(unsafe_code)]
             return unsafe { x86::with_avx2(kernel) };
@@ -179,6 +179,12 @@ pub(super) fn run<K: Kernel>(kernel: K) -> K::Output {
 #[cfg(target_arch = "x86_64")]
 pub(super) fn has_avx512() -> bool {
     std::is_x86_feature_detected!("avx512f") && std::is_x86_feature_detected!("avx512vl")
+}
+
+/// Whether this processor has AVX2.
+#[cfg(target_arch = "x86_64")]
+pub(super) fn has_avx2() -> bool {
+    std::is_x86_feature_detected!("avx2")
 }
 
 /// Kernels compiled for some of the instruction sets of x86-64.

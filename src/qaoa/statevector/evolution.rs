@@ -45,7 +45,7 @@ pub(super) fn in_doubles(ising: &Ising) -> Box<dyn State> {
         if simd::has_avx512() {
             return Box::new(Evolution::<D8Wide>::new(ising));
         }
-        if std::is_x86_feature_detected!("avx2") {
+        if simd::has_avx2() {
             return Box::new(Evolution::<D4x2>::new(ising));
         }
     }
@@ -55,7 +55,7 @@ pub(super) fn in_doubles(ising: &Ising) -> Box<dyn State> {
 /// The same in singles.
 pub(super) fn in_singles(ising: &Ising) -> Box<dyn State> {
     #[cfg(target_arch = "x86_64")]
-    if std::is_x86_feature_detected!("avx2") {
+    if simd::has_avx2() {
         return Box::new(Evolution::<S8Wide>::new(ising));
     }
     Box::new(Evolution::<S8>::new(ising))
@@ -252,7 +252,7 @@ mod tests {
             let doubles = outcome(Evolution::<D8>::new(&ising));
             let singles = outcome(Evolution::<S8>::new(&ising));
             prop_assert!((doubles.0 - singles.0).abs() < 1e-4);
-            if std::is_x86_feature_detected!("avx2") {
+            if simd::has_avx2() {
                 prop_assert_eq!(&outcome(Evolution::<D4x2>::new(&ising)), &doubles);
                 prop_assert_eq!(&outcome(Evolution::<S8Wide>::new(&ising)), &singles);
             }

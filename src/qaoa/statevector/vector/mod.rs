@@ -106,7 +106,7 @@ mod tests {
     #[cfg(target_arch = "x86_64")]
     #[test]
     fn registers_give_what_plain_rust_gives() {
-        if std::is_x86_feature_detected!("avx2") {
+        if simd::has_avx2() {
             assert_eq!(all::<D4x2>(), all::<D8>());
             assert_eq!(all::<S8Wide>(), all::<S8>());
         }
