@@ -55,7 +55,7 @@ pub fn run(args: &CheckArgs, shown: &Shown) -> Result<String, CliError> {
         return Err(files::FileError::NoMission(args.scenario.clone()).into());
     }
     let load = began.elapsed();
-    let rally = super::once::rally_places(&scenario.rally)?;
+    let rally = super::reading::rally_places(&scenario.rally)?;
     let input = Input {
         mission: &scenario.mission,
         fences: &scenario.fences,

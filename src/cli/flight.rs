@@ -1,7 +1,7 @@
 //! Planning for a vehicle in flight: only the rest of its mission is planned, from where it is.
 
 use super::CliError;
-use super::once::Read;
+use super::reading::Read;
 use crate::geodesy::LatLon;
 use crate::mission::{Command, Frame, Mission, MissionItem, rejoined, remaining};
 use crate::replan::judge::{LegVerdict, judge};

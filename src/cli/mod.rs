@@ -4,6 +4,7 @@
 //! - [`options`]: what the commands have in common, with the names of the configuration file;
 //! - [`signing`]: the options that sign a link;
 //! - [`files`]: scenarios, missions and fences from files, results to files;
+//! - [`reading`]: what is read from a vehicle; [`flight`]: the rest of a mission that is being flown;
 //! - [`progress`]: what is shown while something runs; [`terminal`]: what the terminal can show;
 //! - [`mod@run`], [`status`], [`plan`], [`check`], [`once`], [`compare`], [`qaoa`], [`ibm`]: one command
 //!   each;
@@ -24,6 +25,7 @@ pub mod options;
 pub mod plan;
 pub mod progress;
 pub mod qaoa;
+pub(crate) mod reading;
 pub mod run;
 pub mod signing;
 pub mod status;

@@ -53,7 +53,7 @@ pub fn run(args: &PlanArgs, shown: &Shown) -> Result<String, CliError> {
         return Err(files::FileError::NoMission(args.scenario.clone()).into());
     }
     shown.warn(&scenario.warnings);
-    let rally = super::once::rally_places(&scenario.rally)?;
+    let rally = super::reading::rally_places(&scenario.rally)?;
     let options = args.planning.options();
     let input = Input {
         mission: &scenario.mission,

@@ -6,8 +6,8 @@ use std::time::SystemTime;
 use serde::Serialize;
 
 use super::place::Place;
+use super::planned::Fingerprint;
 use super::speech::{Severity, Text, about_fallback, about_plan};
-use super::work::Fingerprint;
 use crate::cli::CliError;
 use crate::link::message::CommandAck;
 use crate::replan::{ReplanError, Replanned};
@@ -118,6 +118,13 @@ impl Answer {
         self.verdict = Verdict::Uploaded;
         let words = format!("mission uploaded and verified ({items} items)");
         self.texts.push(Text::new(Severity::Notice, words));
+    }
+
+    /// The plan has arrived, and meanwhile the vehicle is where the way to it is not clear.
+    pub(super) fn way_is_not_clear(&mut self, error: &CliError) {
+        let words = "the way to the next item is not clear: stop";
+        self.texts.push(Text::new(Severity::Critical, words));
+        self.reason = Some(format!("the new mission is on the vehicle, but {error}"));
     }
 
     pub(super) fn no_mission() -> Self {

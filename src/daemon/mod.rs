@@ -4,7 +4,8 @@
 //! - [`session`]: one vehicle from being found to being lost;
 //! - [`hints`]: signs of a change on the link; [`place`]: a vehicle that has moved; [`agenda`]: when
 //!   to act on them;
-//! - [`work`]: one look, plan and upload, and its [`answer`];
+//! - [`work`]: one look, plan and upload, which [`gate`] lets be called off until it writes; its
+//!   [`answer`], and what is [`planned`] by then;
 //! - [`requests`], [`own`], [`speech`]: quavd as a MAVLink component: commands, parameters, texts;
 //! - [`status`], [`resources`], [`socket`], [`history`]: what a person on the board can see.
 //!
@@ -14,10 +15,12 @@
 mod agenda;
 mod answer;
 mod backoff;
+mod gate;
 mod hints;
 mod history;
 mod own;
 mod place;
+mod planned;
 mod requests;
 pub mod resources;
 mod session;
@@ -41,11 +44,10 @@ use self::answer::Verdict;
 use self::backoff::Backoff;
 use self::history::History;
 use self::own::Own;
-use self::place::Place;
+use self::planned::Planned;
 use self::session::{Connection, Ended, stay};
 use self::socket::Socket;
 use self::status::Board;
-use self::work::Fingerprint;
 use crate::cli::CliError;
 use crate::config::Configuration;
 use crate::link::{Endpoint, Link, Signer, Transport};
@@ -69,10 +71,9 @@ struct Service {
     board: Board,
     pulse: Arc<Pulse>,
     trigger: Arc<Notify>,
-    /// What was planned last.
-    known: Option<Fingerprint>,
-    /// From where.
-    planned_from: Option<Place>,
+    planned: Planned,
+    /// A plan waits for the vehicle to be disarmed, which may be after a time out of reach.
+    waits_for_disarming: bool,
     /// What the last answer was, so that the same trouble is told once.
     last: Option<Verdict>,
 }
@@ -166,8 +167,8 @@ async fn supervise(configuration: Configuration) -> Result<(), CliError> {
         board: Board::new(),
         pulse: Arc::new(Pulse::new()),
         trigger: Arc::new(Notify::new()),
-        known: None,
-        planned_from: None,
+        planned: Planned::default(),
+        waits_for_disarming: false,
         last: None,
     };
     service.tell_options();
@@ -206,7 +207,7 @@ async fn supervise(configuration: Configuration) -> Result<(), CliError> {
             Ok(own) => {
                 service.history = History::new(&state, own.room_for_history());
                 service.own = own;
-                service.known = None;
+                service.planned.forget();
                 service.tell_options();
                 tracing::info!("the configuration was read again");
             }

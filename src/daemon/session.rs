@@ -12,10 +12,11 @@ use super::agenda::{Agenda, Due};
 use super::answer::{Answer, Verdict};
 use super::hints::{Hint, Hints};
 use super::place::Moves;
+use super::planned::Basis;
 use super::requests::{Asker, Request, answer};
 use super::speech::{Severity, Speaker, Text};
 use super::status::{LastAnswer, VehicleStatus};
-use super::work::{End, Fingerprint, Order, Phase, Work};
+use super::work::{End, Order, Phase, Work};
 use crate::config::Policy;
 use crate::link::message::CommandAck;
 use crate::link::{Inbox, Link, LinkError, LinkTask, Received};
@@ -51,6 +52,13 @@ pub(super) enum Ended {
     Silent(Duration),
 }
 
+/// Work that runs, why, and on which basis it was begun.
+struct Running {
+    work: Work,
+    due: Due,
+    basis: Basis,
+}
+
 struct Session<'a> {
     service: &'a mut Service,
     link: Link,
@@ -58,9 +66,7 @@ struct Session<'a> {
     speaker: Speaker,
     hints: Hints,
     agenda: Agenda,
-    work: Option<(Work, Due)>,
-    /// What a disarmed vehicle is waited for with.
-    waits_for_disarming: bool,
+    work: Option<Running>,
     moves: Moves,
 }
 
@@ -78,7 +84,6 @@ pub(super) async fn stay(
         hints: Hints::new(vehicle.node(), link.node()),
         agenda: Agenda::new(now, times.quiet_time(), Duration::from_secs(times.poll.into())),
         work: None,
-        waits_for_disarming: false,
         moves: Moves::default(),
         service,
         link,
@@ -127,7 +132,7 @@ impl Session<'_> {
     }
 
     fn is_writing(&self) -> bool {
-        self.work.as_ref().is_some_and(|(work, _)| matches!(work.phase(), Phase::Writing(_)))
+        self.work.as_ref().is_some_and(|it| matches!(it.work.phase(), Phase::Writing(_)))
     }
 
     /// One frame of anybody's.
@@ -149,7 +154,7 @@ impl Session<'_> {
                 self.service.tell_options();
                 let times = &self.service.own.options.service;
                 self.agenda.set_times(times.quiet_time(), Duration::from_secs(times.poll.into()));
-                self.service.known = None;
+                self.service.planned.forget();
                 self.agenda.changed(now, "a parameter of quavd was set");
                 self.overtake("a parameter of quavd was set");
                 Ok(())
@@ -163,7 +168,7 @@ impl Session<'_> {
     /// Newer input: what is planned for the old one is called off. What is being written goes to
     /// its end, and is looked at again then.
     fn overtake(&mut self, trigger: &str) {
-        let Some((work, _)) = &self.work else { return };
+        let Some(Running { work, .. }) = &self.work else { return };
         let was_planning = matches!(work.phase(), Phase::Planning(_));
         if work.cancel() && was_planning {
             tracing::info!(trigger, "the plan that was being made is for old input: called off");
@@ -177,11 +182,11 @@ impl Session<'_> {
             self.speaker.say(&Text::new(Severity::Notice, words)).await?;
             return self.link.send(&asker.ack(CommandAck::DENIED, 255)).await;
         }
-        let is_known = self.work.as_ref().is_some_and(|(_, due)| due.askers.contains(&asker));
+        let is_known = self.work.as_ref().is_some_and(|it| it.due.askers.contains(&asker));
         if !is_known {
             self.agenda.asked(Instant::now(), "asked for by command", Some(asker));
         }
-        let percent = self.work.as_ref().map_or(0, |(work, _)| work.phase().percent());
+        let percent = self.work.as_ref().map_or(0, |it| it.work.phase().percent());
         self.link.send(&asker.ack(CommandAck::IN_PROGRESS, percent)).await
     }
 
@@ -194,46 +199,38 @@ impl Session<'_> {
             vehicle: Arc::clone(&self.vehicle),
             store: self.service.store.clone(),
             options: Arc::new(options.clone()),
-            known: self.service.known,
+            known: self.service.planned.fingerprint(),
             force: due.force,
             plan: options.service.enable && wanted,
         };
         self.service.board.change(|status| status.counts.looks += 1);
-        self.work = Some((Work::start(order), due));
+        let basis = self.service.planned.basis();
+        self.work = Some(Running { work: Work::start(order), due, basis });
         Ok(())
     }
 
     /// A piece of work has ended.
     async fn worked(&mut self, end: End) -> Result<(), LinkError> {
-        let Some((_, due)) = self.work.take() else { return Ok(()) };
+        let Some(Running { due, basis, .. }) = self.work.take() else { return Ok(()) };
         let now = Instant::now();
         match end {
             End::Cancelled => {
                 self.agenda.again(now, due);
                 Ok(())
             }
-            End::Seen(fingerprint) => {
+            End::Seen => {
+                tracing::debug!("looked: nothing to plan");
                 self.agenda.done(now);
-                self.seen(fingerprint);
                 for asker in due.askers {
                     self.link.send(&asker.ack(CommandAck::DENIED, 255)).await?;
                 }
                 Ok(())
             }
-            End::Answered(answer) => self.answered(*answer, due).await,
+            End::Answered(answer) => self.answered(*answer, due, basis).await,
         }
     }
 
-    /// Looked at and not planned.
-    fn seen(&mut self, fingerprint: Fingerprint) {
-        tracing::debug!("looked: nothing to plan");
-        let service = &self.service.own.options.service;
-        if service.enable && service.policy == Policy::OnChange {
-            self.service.known = Some(fingerprint);
-        }
-    }
-
-    async fn answered(&mut self, answer: Answer, due: Due) -> Result<(), LinkError> {
+    async fn answered(&mut self, answer: Answer, due: Due, basis: Basis) -> Result<(), LinkError> {
         let now = Instant::now();
         let verdict = answer.verdict;
         self.agenda.done(now);
@@ -241,14 +238,13 @@ impl Session<'_> {
             self.agenda.failed(now, due.trigger, due.force);
         } else {
             // What was just written is a change as well: the next look sees that it is ours.
-            self.service.known = answer.fingerprint;
-            self.service.planned_from = answer.planned_from;
+            self.service.planned.keep(basis, answer.fingerprint, answer.planned_from);
         }
         if verdict == Verdict::Overtaken {
             self.service.board.change(|status| status.counts.cancelled += 1);
             return Ok(());
         }
-        self.waits_for_disarming = verdict == Verdict::Armed;
+        self.service.waits_for_disarming = verdict == Verdict::Armed;
         // The same failure again is no news.
         let is_news = !verdict.is_worth_retrying() || self.service.last != Some(verdict);
         self.service.last = Some(verdict);
@@ -314,20 +310,19 @@ impl Session<'_> {
     async fn look_around(&mut self) -> Result<(), LinkError> {
         let now = Instant::now();
         let state = self.vehicle.state();
-        if self.waits_for_disarming && !state.is_armed() {
-            self.waits_for_disarming = false;
-            self.service.known = None;
+        if self.service.waits_for_disarming && !state.is_armed() {
+            self.service.waits_for_disarming = false;
+            self.service.planned.forget();
             self.agenda.changed(now, "the vehicle was disarmed");
         }
-        if let Some(planned) = self.service.planned_from
+        if let Some(planned) = self.service.planned.from()
             && self.moves.has_moved(now, planned, &state)
         {
-            self.service.known = None;
-            self.service.planned_from = None;
+            self.service.planned.forget();
             self.agenda.changed(now, "the vehicle or its home is in another place");
             self.overtake("the vehicle or its home is in another place");
         }
-        let phase = self.work.as_ref().map(|(work, _)| work.phase());
+        let phase = self.work.as_ref().map(|it| it.work.phase());
         self.service.board.change(|status| {
             status.state = phase.map_or("watching", Phase::name).to_owned();
             status.progress = phase.map(Phase::percent).filter(|&percent| percent > 0);
@@ -338,7 +333,7 @@ impl Session<'_> {
                 silent_s: state.heard_at.elapsed().as_secs_f64(),
             });
         });
-        let Some((work, due)) = &self.work else { return Ok(()) };
+        let Some(Running { work, due, .. }) = &self.work else { return Ok(()) };
         let percent = work.phase().percent();
         if percent > 0 {
             self.speaker.show("quav_prog", f64::from(percent)).await?;
@@ -351,7 +346,7 @@ impl Session<'_> {
 
     /// Ends what runs: a plan is called off, an upload is waited for.
     async fn wind_up(&mut self, ended: &Ended) {
-        let Some((work, due)) = &mut self.work else { return };
+        let Some(Running { work, due, basis }) = &mut self.work else { return };
         if work.cancel() {
             work.ended().await;
         } else {
@@ -359,9 +354,8 @@ impl Session<'_> {
             let pulse = Arc::clone(&self.service.pulse);
             match pulse.beating(tokio::time::timeout(LAST_UPLOAD, work.ended())).await {
                 Ok(End::Answered(answer)) => {
-                    let due = due.clone();
-                    self.service.known = answer.fingerprint;
-                    self.service.planned_from = answer.planned_from;
+                    let (due, basis) = (due.clone(), *basis);
+                    self.service.planned.keep(basis, answer.fingerprint, answer.planned_from);
                     self.record(&answer, &due, Instant::now());
                 }
                 Ok(_) => {}
@@ -374,9 +368,9 @@ impl Session<'_> {
 }
 
 /// The end of the work that runs, never where none does.
-async fn ended(work: &mut Option<(Work, Due)>) -> End {
+async fn ended(work: &mut Option<Running>) -> End {
     match work {
-        Some((work, _)) => work.ended().await,
+        Some(Running { work, .. }) => work.ended().await,
         None => std::future::pending().await,
     }
 }

@@ -21,6 +21,8 @@ const MOST_LEGS: usize = 3;
 /// `MAV_SEVERITY`, the ones that are used here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Severity {
+    /// Something the pilot must act on at once.
+    Critical = 2,
     /// Something the pilot should act on.
     Warning = 4,
     /// Something the pilot wants to know.

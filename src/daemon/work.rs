@@ -1,23 +1,22 @@
 //! One piece of work: look at what the vehicle holds, and where that is new, plan, upload and
 //! prove. It runs as a task of its own, so that the daemon goes on hearing the vehicle meanwhile.
-//!
-//! Until the first byte is written it can be called off; from then on it goes to its end, since a
-//! half-written mission is worse than an old one.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use sha2::{Digest, Sha256};
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
 
 use super::answer::{Answer, Verdict};
+use super::gate::Gate;
 use super::place::Place;
+use super::planned::Fingerprint;
 use crate::cli::CliError;
 use crate::cli::flight::way_is_clear;
-use crate::cli::once::{Held, Read, in_flight, intended, read};
+use crate::cli::once::{in_flight, intended};
 use crate::cli::options::as_qpu;
 use crate::cli::progress::Shown;
+use crate::cli::reading::{Held, Read, read};
 use crate::config::DaemonOptions;
 use crate::ibm::qpu::IbmQpu;
 use crate::mission::{MissionItem, MissionType};
@@ -25,7 +24,6 @@ use crate::replan::{Input, Options, ReplanError, Replanned, Stage, replan_with};
 use crate::report::Run;
 use crate::report::json::PlanDocument;
 use crate::report::picture::picture;
-use crate::stop::Stop;
 use crate::store::Store;
 use crate::vehicle::readback::differences;
 use crate::vehicle::replace::{Obstacle, ReplaceError, Replacement, Step, replace, settle};
@@ -33,37 +31,6 @@ use crate::vehicle::{Autopilot, Vehicle};
 
 /// A vehicle does not wait longer for a QPU's queue, unless the configuration sets a deadline.
 const LONGEST_QUEUE: Duration = Duration::from_secs(60);
-
-/// What a vehicle holds, as a number that differs where the plans differ.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Fingerprint([u8; 32]);
-
-impl Fingerprint {
-    /// Of downloaded plans. Home, which ArduPilot keeps in the mission, is no part of it: it moves
-    /// with every fix.
-    fn of(autopilot: Autopilot, held: &Held) -> Self {
-        let homes = usize::from(autopilot == Autopilot::ArduPilot).min(held.mission.len());
-        let mut hash = Sha256::new();
-        for items in [&held.mission[homes..], &held.fence, &held.rally] {
-            hash.update((items.len() as u64).to_le_bytes());
-            for item in items {
-                hash_item(&mut hash, item);
-            }
-        }
-        Self(hash.finalize().into())
-    }
-}
-
-fn hash_item(hash: &mut Sha256, item: &MissionItem) {
-    hash.update(item.command.0.to_le_bytes());
-    hash.update([item.frame.0, item.autocontinue]);
-    for param in item.params {
-        hash.update(param.to_bits().to_le_bytes());
-    }
-    hash.update(item.x.to_le_bytes());
-    hash.update(item.y.to_le_bytes());
-    hash.update(item.z.to_bits().to_le_bytes());
-}
 
 /// What a piece of work is doing.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -116,7 +83,7 @@ pub(super) enum End {
     /// Called off; nothing was written.
     Cancelled,
     /// What is held was not planned: nothing is new, or nobody wants it planned.
-    Seen(Fingerprint),
+    Seen,
     /// Answered by a plan or a reason.
     Answered(Box<Answer>),
 }
@@ -158,61 +125,6 @@ impl Work {
     }
 }
 
-/// Decides between "called off" and "writing": the one that is first wins.
-#[derive(Default)]
-struct Gate {
-    state: Mutex<GateState>,
-    stop: Stop,
-}
-
-#[derive(Default, Clone, Copy, PartialEq)]
-enum GateState {
-    #[default]
-    Open,
-    Cancelled,
-    Writing,
-}
-
-impl Gate {
-    fn cancel(&self) -> bool {
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        if *state != GateState::Writing {
-            *state = GateState::Cancelled;
-            self.stop.cancel();
-        }
-        *state == GateState::Cancelled
-    }
-
-    /// From now on it cannot be called off. `false` where it already has been.
-    fn begin_writing(&self) -> bool {
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        if *state == GateState::Open {
-            *state = GateState::Writing;
-        }
-        *state == GateState::Writing
-    }
-
-    /// After a settlement, before anything new is written.
-    fn end_writing(&self) {
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        if *state == GateState::Writing {
-            *state = GateState::Open;
-        }
-    }
-
-    fn is_cancelled(&self) -> bool {
-        self.stop.is_stopped()
-    }
-
-    async fn cancelled(&self) {
-        /// The rare case is what waits here.
-        const LOOK: Duration = Duration::from_millis(20);
-        while !self.is_cancelled() {
-            tokio::time::sleep(LOOK).await;
-        }
-    }
-}
-
 async fn run(order: Order, gate: Arc<Gate>, phase: watch::Sender<Phase>) -> End {
     match work(&order, &gate, &phase).await {
         Ok(end) => end,
@@ -238,7 +150,7 @@ async fn work(
     };
     let fingerprint = Fingerprint::of(vehicle.autopilot(), &held);
     if !order.plan || (order.known == Some(fingerprint) && !order.force) {
-        return Ok(End::Seen(fingerprint));
+        return Ok(End::Seen);
     }
     // As it was before what follows read it: what moves from now on has moved.
     let place = Place::of(&vehicle.state());
@@ -288,7 +200,14 @@ async fn work(
     });
     match list {
         Ok(intended) => {
+            let list = intended.clone();
             deliver(order, gate, phase, (&input, &read), intended, &planned, &mut answer).await;
+            if flight.is_some()
+                && answer.verdict == Verdict::Uploaded
+                && let Err(error) = way_is_clear(vehicle, &read, &list, &planning)
+            {
+                answer.way_is_not_clear(&error);
+            }
         }
         Err(error) => {
             let Answer { verdict, texts, reason, .. } = *Answer::from_cli(error);
@@ -349,7 +268,7 @@ async fn plan(
     phase: &watch::Sender<Phase>,
 ) -> Result<(Read, Result<Replanned, ReplanError>), Box<Answer>> {
     phase.send_replace(Phase::Planning(0.0));
-    let (stop, phase) = (gate.stop.clone(), phase.clone());
+    let (stop, phase) = (gate.stop(), phase.clone());
     let task = tokio::task::spawn_blocking(move || {
         let input = Input {
             mission: &read.scenario.mission,
@@ -427,16 +346,6 @@ impl From<CliError> for Box<Answer> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn what_is_being_written_is_not_called_off_and_what_was_called_off_is_not_written() {
-        let gate = Gate::default();
-        assert!(gate.begin_writing());
-        assert!(!gate.cancel() && !gate.is_cancelled());
-        gate.end_writing();
-        assert!(gate.cancel() && gate.is_cancelled());
-        assert!(!gate.begin_writing());
-    }
 
     #[test]
     fn progress_only_rises_from_phase_to_phase() {

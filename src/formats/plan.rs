@@ -2,13 +2,14 @@
 //!
 //! (QGroundControl developer guide, "Plan File Format".) Optional keys vary between versions, so
 //! what is not needed is not required. [`read`] and [`write`] hold one direction each,
-//! [`fence`] reads the geoFence and [`complex`] the items that stand for several, which [`kept`] holds
-//! to be written back.
+//! [`fence`] reads the geoFence, [`complex`] and [`structure_scan`] the items that stand for several
+//! without listing them, and [`kept`] holds what is to be written back.
 
 mod complex;
 mod fence;
 mod kept;
 mod read;
+mod structure_scan;
 #[cfg(test)]
 mod tests;
 mod write;

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use crate::airspace::Airspace;
 use crate::cli::CliError;
-use crate::cli::once::rally_places;
 use crate::cli::plan::position_of_start;
+use crate::cli::reading::rally_places;
 use crate::formats::Scenario;
 use crate::geodesy::{LatLon, LocalFrame, ProjectionError, Xy, Zone, geodesic_distance};
 use crate::mission::legs::{LegKind, LegShape};

@@ -7,7 +7,7 @@ use serde::Deserialize;
 use crate::formats::error::Problem;
 use crate::formats::item::FileItem;
 
-const WAYPOINT: u16 = 16;
+pub(super) const WAYPOINT: u16 = 16;
 const LAND: u16 = 21;
 const LOITER_TO_ALT: u16 = 31;
 const VTOL_LAND: u16 = 85;
@@ -16,9 +16,9 @@ const DO_SET_CAM_TRIGG_DIST: u16 = 206;
 const IMAGE_STOP_CAPTURE: u16 = 2001;
 const VIDEO_STOP_CAPTURE: u16 = 2501;
 const FRAME_GLOBAL: u8 = 0;
-const FRAME_MISSION: u8 = 2;
-const FRAME_RELATIVE: u8 = 3;
-const NAN: f64 = f64::NAN;
+pub(super) const FRAME_MISSION: u8 = 2;
+pub(super) const FRAME_RELATIVE: u8 = 3;
+pub(super) const NAN: f64 = f64::NAN;
 
 /// The keys of `fwLandingPattern` and `vtolLandingPattern`. Coordinates are `[lat, lon, altitude]`.
 #[derive(Deserialize, Default)]
@@ -83,7 +83,7 @@ fn coordinate(values: Option<&Vec<f64>>) -> Option<[f64; 3]> {
     values?.as_slice().try_into().ok()
 }
 
-fn item(command: u16, frame: u8, params: [f64; 4], place: [f64; 3]) -> FileItem {
+pub(super) fn item(command: u16, frame: u8, params: [f64; 4], place: [f64; 3]) -> FileItem {
     let [p1, p2, p3, p4] = params;
     let [p5, p6, p7] = place;
     FileItem { command, frame, params: [p1, p2, p3, p4, p5, p6, p7], autocontinue: true }

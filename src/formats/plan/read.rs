@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use super::fence::{GeoFence, read_fence};
 use super::kept::KeptPlan;
-use super::{OBJECT_VERSION, complex};
+use super::{OBJECT_VERSION, complex, structure_scan};
 use crate::formats::error::{Located, Place, Problem};
 use crate::formats::item::{FileItem, float, jumps_to_indices, natural, place};
 use crate::formats::{MAX_ITEMS, Scenario, VehicleHint};
@@ -57,6 +57,8 @@ pub(super) struct PlanItem {
     transect: Option<Transect>,
     #[serde(flatten)]
     landing: complex::LandingPattern,
+    #[serde(flatten)]
+    scan: structure_scan::StructureScan,
 }
 
 #[derive(Deserialize)]
@@ -204,6 +206,10 @@ impl Flat {
             }
         } else if complex::is_landing_pattern(kind) {
             for simple in item.landing.items(kind).map_err(at)? {
+                self.push(number, None, &simple)?;
+            }
+        } else if structure_scan::is_structure_scan(kind) {
+            for simple in item.scan.items().map_err(at)? {
                 self.push(number, None, &simple)?;
             }
         } else {

@@ -88,6 +88,26 @@ async fn how_far_an_upload_is_can_be_seen_on_the_ground() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_parameter_that_is_set_while_a_mission_is_written_counts_for_the_next() {
+    let mut vehicle = vehicle_with("ardupilot", "s1");
+    vehicle.fault("delay:ms=80,dir=tx,msg=MISSION_REQUEST");
+    let station = Station::open(&vehicle).await;
+    let daemon = Daemon::start(&vehicle.urls[0], "poll = 3600");
+    daemon.wait_for("an upload", |status| status.progress.is_some_and(|percent| percent > 75));
+    let name = ParamName::new("QUAV_BUFFER").unwrap();
+    let set = ParamSet { bits: 7.0_f32.to_bits(), target: DAEMON, name, kind: 9 };
+    station.link.send(&set).await.unwrap();
+    let first = daemon.wait_for_answer(1).counts;
+    assert_eq!((first.uploads, first.cancelled), (1, 0), "it was being written");
+    let last = daemon.wait_for("another", |status| status.counts.uploads == 2).last.unwrap();
+    let report: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(last.report.unwrap()).unwrap()).unwrap();
+    let clearance = report["plan"]["min_clearance_m"].as_f64().unwrap();
+    assert!(clearance >= 6.99, "{clearance}");
+    station.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn what_is_disabled_on_the_ground_neither_plans_nor_obeys_until_it_is_enabled() {
     let mut vehicle = vehicle_with("ardupilot", "s5");
     let mut station = Station::open(&vehicle).await;

@@ -95,6 +95,22 @@ fn an_armed_vehicle_is_written_to_when_it_is_disarmed() {
 }
 
 #[test]
+fn a_vehicle_that_was_armed_out_of_reach_and_comes_back_is_written_to_when_it_is_disarmed() {
+    let mut vehicle = vehicle_with("ardupilot", "s5");
+    vehicle.control(&json!({"cmd": "set", "armed": true}));
+    let daemon = Daemon::start(&vehicle.urls[0], "retry = 1\npoll = 3600");
+    assert_eq!(verdict(&daemon.wait_for_answer(1)), "armed");
+    vehicle.fault("silence:for=12");
+    daemon.wait_for("the loss", |status| status.vehicle.is_none());
+    daemon.wait_for("its return", |status| {
+        status.vehicle.as_ref().is_some_and(|vehicle| vehicle.armed) && status.counts.looks >= 2
+    });
+    vehicle.control(&json!({"cmd": "set", "armed": false}));
+    let status = daemon.wait_for("the upload", |status| status.counts.uploads == 1);
+    assert_eq!(status.last.unwrap().trigger, "the vehicle was disarmed");
+}
+
+#[test]
 fn in_flight_it_writes_where_the_configuration_allows_it_and_the_vehicle_flies_on() {
     let mut vehicle = vehicle_with("px4", "s5");
     let dump = vehicle.dump();
