@@ -228,12 +228,21 @@ pub fn write_shown(paths: &[PathBuf], report: &Report<'_>) -> Result<(), CliErro
     write_all(&shown, &Scenario::default(), report)
 }
 
+/// The system's error alone: the place that `tempfile` adds is the temporary file's, which says
+/// nothing to a reader.
+fn without_place(error: io::Error) -> io::Error {
+    match error.to_string().split_once(" at path ") {
+        Some((what, _)) => io::Error::new(error.kind(), what),
+        None => error,
+    }
+}
+
 /// Replaces a file by new content, whole or not at all.
 ///
 /// # Errors
 /// [`FileError::Write`].
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
-    let fail = |source| FileError::Write { path: path.to_owned(), source };
+    let fail = |error| FileError::Write { path: path.to_owned(), source: without_place(error) };
     let directory = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
@@ -248,4 +257,19 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     file.write_all(bytes).map_err(fail)?;
     file.persist(path).map_err(|error| fail(error.error))?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_cannot_be_written_is_named_and_no_other() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("missing").join("x.html");
+        let told = write(&path, b"").unwrap_err().to_string();
+        let expected =
+            format!("cannot write {}: No such file or directory (os error 2)", path.display());
+        assert_eq!(told, expected);
+    }
 }

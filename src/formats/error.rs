@@ -106,6 +106,9 @@ pub enum Problem {
         /// Offset of the first bad byte.
         at: usize,
     },
+    /// Nothing at all, or comments only.
+    #[error("the file is empty; was it saved, and copied whole?")]
+    Empty,
     /// None of the formats.
     #[error(
         "this is none of the formats quavd reads: QGroundControl .plan, QGC WPL 110 waypoints, \

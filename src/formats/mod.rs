@@ -179,7 +179,8 @@ fn read(name: &str, bytes: &[u8], want: Want) -> Result<Scenario, Located> {
         Some(line) if line.starts_with("QGC WPL") => waypoints::read(name, text),
         Some(line) if fence_text::is_position(line) => fence_text::read(name, text),
         Some(line) if fence_text::is_rally(line) => fence_text::read_rally(text),
-        _ => Err(Problem::UnknownFormat.into()),
+        Some(_) => Err(Problem::UnknownFormat.into()),
+        None => Err(Problem::Empty.into()),
     }
 }
 

@@ -304,7 +304,8 @@ fn positions_are_rounded_to_the_nearest_not_cut() {
 
 #[test]
 fn files_of_other_kinds_are_refused_with_what_to_do() {
-    assert!(error_of("").contains("none of the formats"));
+    assert!(error_of("").contains("the file is empty"));
+    assert!(error_of(" \n# mine\n").contains("the file is empty"));
     assert!(error_of("hello").contains("none of the formats"));
     assert!(error_of("<gpx></gpx>").contains("none of the formats"));
     assert!(error_of("[1,2]").contains("none of the formats"));

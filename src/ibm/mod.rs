@@ -7,8 +7,8 @@
 //! [`unfolding`] out of the probabilities of bitstrings.
 //!
 //! The half that talks to the service: [`account`] says who pays ([`secret`]), [`client`] speaks the REST
-//! API, [`program`] is what a job holds and how its results are read, [`ledger`] the jobs on disk, and
-//! [`qpu`] all of it as a [`Qpu`](crate::qaoa::qpu::Qpu); [`error`](mod@error) says what went wrong and
+//! API, [`program`] is what a job holds and how its results are read, [`duration`] how long it takes,
+//! [`ledger`] the jobs on disk, and [`qpu`] all of it as a [`Qpu`](crate::qaoa::qpu::Qpu); [`error`](mod@error) says what went wrong and
 //! what to do.
 
 pub mod account;
@@ -17,9 +17,11 @@ pub mod circuit;
 pub mod client;
 pub mod device;
 mod digest;
+pub mod duration;
 pub mod error;
 #[cfg(test)]
 mod fidelity;
+mod interrupted;
 pub mod ledger;
 pub mod line;
 pub mod lower;

@@ -11,40 +11,27 @@ use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
 use tracing::{debug, info, warn};
 
-use super::circuit::Circuit;
 use super::client::Client;
 use super::client::backends::BackendChoice;
-use super::client::jobs::{MAX_COST, Submission, unique_tag};
+use super::client::jobs::{Submission, unique_tag};
 use super::device::{Device, PhysicalQubit};
 use super::digest::digest;
+use super::duration::{cap, example, job_seconds, shot_seconds};
 use super::error::IbmError;
+use super::interrupted::{Interrupted, stopped};
 use super::ledger::{Ledger, Record};
 use super::lower::{Binding, lower, lower_on};
-use super::metrics::Metrics;
 use super::mitigation::mitigated_expectation;
 use super::program::{Program, Pub, Sampler};
 use super::unfolding::unfolded;
+use crate::qaoa::Angles;
 use crate::qaoa::qpu::{
     JobPlan, Measured, Qpu, QpuCircuit, QpuError, QpuUse, Use, sampled_expectation,
 };
-use crate::qaoa::{Angles, ChainIsing};
-use crate::stop::{Stop, Stopped};
-
-/// QPU seconds that a job takes besides its shots (measured by others at 2 on live QPUs).
-const JOB_SECONDS: f64 = 2.0;
-
-/// The pause between shots where the backend does not say, seconds.
-const REPETITION_DELAY: f64 = 250e-6;
-
-/// A job's cap: this many times its estimate, and never less than the second figure, seconds.
-const CAP_FACTOR: f64 = 3.0;
-const LEAST_CAP: f64 = 15.0;
+use crate::stop::Stop;
 
 /// How long a batch may live, seconds (the most that the Open plan allows).
 const BATCH_TTL: u32 = 600;
-
-/// How often the wish to stop is looked at.
-const STOP_CHECK: Duration = Duration::from_millis(50);
 
 /// How long cancelling a job, or asking what it has cost, may take.
 const TIDY_PATIENCE: Duration = Duration::from_secs(10);
@@ -260,8 +247,7 @@ impl IbmQpu {
         self.ledger.put(&record)?;
         self.own.insert(digest);
 
-        let estimate = JOB_SECONDS + f64::from(shots) * shot * pubs.len() as f64;
-        let cost = (CAP_FACTOR * estimate).max(LEAST_CAP).ceil().min(f64::from(MAX_COST)) as u32;
+        let cost = cap(job_seconds(pubs.len(), f64::from(shots) * shot));
         let params = self.program.params(&pubs, shots);
         let outcome = self.paid(&mut record, picked_up, &params, cost, (&pubs, shots), stop);
         let body = match outcome {
@@ -393,74 +379,6 @@ impl Drop for IbmQpu {
     }
 }
 
-/// Why work on the network ended without its outcome.
-enum Interrupted {
-    Failed(IbmError),
-    Stopped(Stopped, Duration),
-}
-
-impl From<IbmError> for Interrupted {
-    fn from(error: IbmError) -> Self {
-        Self::Failed(error)
-    }
-}
-
-impl Interrupted {
-    /// Says which job was cancelled.
-    fn with_job(self, job: Option<String>) -> Self {
-        match (self, job) {
-            (Self::Stopped(Stopped::DeadlinePassed, after), Some(job)) => {
-                Self::Failed(IbmError::Deadline { after, job: Some(job) })
-            }
-            (interrupted, _) => interrupted,
-        }
-    }
-}
-
-impl From<Interrupted> for QpuError {
-    fn from(interrupted: Interrupted) -> Self {
-        match interrupted {
-            Interrupted::Failed(error) => {
-                let late = matches!(error, IbmError::Deadline { .. });
-                Self { reason: error.to_string(), stopped: late.then_some(Stopped::DeadlinePassed) }
-            }
-            Interrupted::Stopped(Stopped::Cancelled, _) => {
-                Self { reason: IbmError::CalledOff.to_string(), stopped: Some(Stopped::Cancelled) }
-            }
-            Interrupted::Stopped(stopped, after) => Self {
-                reason: IbmError::Deadline { after, job: None }.to_string(),
-                stopped: Some(stopped),
-            },
-        }
-    }
-}
-
-/// Ends when `stop` says so.
-async fn stopped(stop: &Stop) -> Stopped {
-    loop {
-        if let Err(stopped) = stop.check() {
-            return stopped;
-        }
-        let pause = stop.remaining().map_or(STOP_CHECK, |left| left.min(STOP_CHECK));
-        tokio::time::sleep(pause.max(Duration::from_millis(1))).await;
-    }
-}
-
-/// Seconds of QPU time that one shot of a circuit takes.
-#[must_use]
-pub fn shot_seconds(device: &Device, circuit: &Circuit) -> f64 {
-    let run = Metrics::of(circuit, device).duration.map_or(20e-6, |duration| duration.0 * 1e-9);
-    let delay = device.rep_delay().map_or(REPETITION_DELAY, |delay| delay.0 * 1e-9);
-    run + delay
-}
-
-/// A chain like those that are going to be sent, for an estimate.
-fn example(qubits: usize) -> Result<ChainIsing, IbmError> {
-    let coefficients = |n: usize| (0..n).map(|i| 0.1 + 0.01 * (i % 7) as f64).collect();
-    ChainIsing::new(0.0, coefficients(qubits), coefficients(qubits.saturating_sub(1)))
-        .map_err(|error| IbmError::Circuit(error.to_string()))
-}
-
 impl Qpu for IbmQpu {
     fn prepare(
         &mut self,
@@ -476,8 +394,7 @@ impl Qpu for IbmQpu {
             let circuit = lower(device, &chain, Binding::Bound(&Angles::ramp(layers)))
                 .map_err(|error| Interrupted::Failed(IbmError::Circuit(error.to_string())))?;
             let shot = f64::from(shots) * shot_seconds(device, &circuit);
-            let seconds =
-                |kind: &JobPlan| kind.jobs as f64 * (JOB_SECONDS + kind.circuits as f64 * shot);
+            let seconds = |kind: &JobPlan| kind.jobs as f64 * job_seconds(kind.circuits, shot);
             (plan.iter().map(seconds).sum::<f64>(), name.clone())
         };
         let usage = self.until(stop, self.client.usage())?;

@@ -5,7 +5,7 @@ use serde_json::json;
 
 use super::super::CliError;
 use super::target::{ChainArgs, TargetArgs};
-use crate::ibm::qpu::shot_seconds;
+use crate::ibm::duration::shot_seconds;
 use crate::ibm::{Binding, Metrics, lower};
 use crate::qaoa::Angles;
 

@@ -68,6 +68,9 @@ fn a_vehicle_that_is_carried_to_another_place_is_planned_for_from_there() {
     let mut vehicle = vehicle_with("ardupilot", "s5");
     let daemon = Daemon::start(&vehicle.urls[0], "poll = 3600");
     daemon.wait_for_answer(1);
+    daemon.wait_for("its own upload seen", |status| {
+        status.counts.looks >= 2 && status.state == "watching"
+    });
     let home = vehicle.dump()["home"].clone();
     // Some 40 m to the north.
     let lat = home["lat"].as_f64().unwrap() + 0.000_36;

@@ -1,5 +1,6 @@
 //! The exact answer, found another way than quavd's: a visibility graph over all points at which
-//! a shortest path may bend, every vertex of every region rounded finely, without any pruning.
+//! a shortest path may bend, every vertex of every region rounded finely. All that is left out are
+//! lines that do not run along the round that they end on: nobody who pulls a thread tight gets those.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -11,6 +12,23 @@ use super::scene::{Scene, Shape};
 /// The turn between neighbouring points around a vertex, radians: the path is too long by less
 /// than `STEP²/12` of its turns, 3e-4.
 const STEP: f64 = 0.06;
+
+/// How far a line may be off the tangent where it ends on a round: half a step is what a tight
+/// thread needs.
+const OFF_TANGENT: f64 = 1.5 * STEP;
+
+/// A point at which a path may bend, with the direction of the round that it is on.
+#[derive(Clone, Copy)]
+struct Bend {
+    at: P,
+    along: Option<P>,
+}
+
+impl Bend {
+    fn may_be_reached_along(&self, line: P) -> bool {
+        self.along.is_none_or(|along| cross(along, line).abs() <= OFF_TANGENT.sin() * norm(line))
+    }
+}
 
 /// The length of the shortest path that keeps `margin` metres from everything, and `None` where
 /// there is none. With `bound`, only paths up to that length are looked for.
@@ -32,14 +50,15 @@ pub(crate) fn shortest(scene: &Scene, margin: f64, bound: Option<f64>) -> Option
     let threshold = margin - 1e-6;
     let within =
         |p: P| bound.is_none_or(|bound| dist(scene.start, p) + dist(p, scene.goal) <= bound + 1e-6);
-    let mut points = vec![scene.start, scene.goal];
-    if points.iter().any(|&p| !in_zones(p) || !walls.are_clear(p, p, threshold)) {
+    let mut points = [scene.start, scene.goal].map(|at| Bend { at, along: None }).to_vec();
+    if points.iter().any(|end| !in_zones(end.at) || !walls.are_clear(end.at, end.at, threshold)) {
         return None;
     }
     points.extend(
         bends(scene, margin)
             .into_iter()
-            .filter(|&p| within(p) && in_zones(p) && walls.are_clear(p, p, threshold)),
+            .filter(|bend| within(bend.at) && in_zones(bend.at))
+            .filter(|bend| walls.are_clear(bend.at, bend.at, threshold)),
     );
 
     let mut done = vec![false; points.len()];
@@ -48,7 +67,7 @@ pub(crate) fn shortest(scene: &Scene, margin: f64, bound: Option<f64>) -> Option
     open.push(Reverse((0, 0, 0u32, 0u32)));
     while let Some(Reverse((_, so_far, at, from))) = open.pop() {
         let (so_far, at, from) = (f64::from_bits(so_far), at as usize, from as usize);
-        if done[at] || (at != from && !walls.are_clear(points[from], points[at], threshold)) {
+        if done[at] || (at != from && !walls.are_clear(points[from].at, points[at].at, threshold)) {
             continue;
         }
         done[at] = true;
@@ -59,8 +78,12 @@ pub(crate) fn shortest(scene: &Scene, margin: f64, bound: Option<f64>) -> Option
             if done[next] {
                 continue;
             }
-            let longer = so_far + dist(points[at], points[next]);
-            let estimate = longer + dist(points[next], scene.goal);
+            let line = sub(points[next].at, points[at].at);
+            if ![at, next].iter().all(|&end| points[end].may_be_reached_along(line)) {
+                continue;
+            }
+            let longer = so_far + norm(line);
+            let estimate = longer + dist(points[next].at, scene.goal);
             if bound.is_none_or(|bound| estimate <= bound) {
                 open.push(Reverse((bits(estimate), bits(longer), next as u32, at as u32)));
             }
@@ -70,14 +93,14 @@ pub(crate) fn shortest(scene: &Scene, margin: f64, bound: Option<f64>) -> Option
 }
 
 /// The points around every vertex and disc, `margin` away from it, on the outside of its turn.
-fn bends(scene: &Scene, margin: f64) -> Vec<P> {
+fn bends(scene: &Scene, margin: f64) -> Vec<Bend> {
     let mut points = Vec::new();
     let mut arc = |centre: P, radius: f64, from: P, turn: f64| {
         let count = (turn.abs() / STEP).ceil().max(1.0);
         let reach = radius / (turn / count / 2.0).cos();
         for k in 0..count as u32 {
             let out = rotated(from, turn * (f64::from(k) + 0.5) / count);
-            points.push(add(centre, mul(out, reach)));
+            points.push(Bend { at: add(centre, mul(out, reach)), along: Some([-out[1], out[0]]) });
         }
     };
     if scene.is_union() {
