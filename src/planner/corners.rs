@@ -4,7 +4,8 @@
 //! A path that keeps a margin `r` from a convex corner turns on an arc of radius `r` around it.
 //! The arc is replaced by points on a circle of radius `r / cos(δ/2)`, `δ` apart, so that the
 //! edges between neighbours just touch the arc. Where these have no room, `δ` is halved: in a
-//! passage that is hardly wide enough the path stays next to the arc.
+//! passage that is hardly wide enough the path stays next to the arc. Where they have little, `δ` is
+//! halved as well: the edges that lead into such a passage are as tight as those within it.
 
 use super::polyline::{cross, distance};
 use crate::airspace::RegionId;
@@ -112,7 +113,13 @@ impl Arc {
             hidden_by: None,
         };
         let margin = space.planning_margin();
-        let Some(hider) = space.airspace().blocker(corner.point, corner.point, margin) else {
+        let stands_out = self.radius * (1.0 / (turn / 2.0).cos() - 1.0);
+        let room = |margin| space.airspace().blocker(corner.point, corner.point, margin);
+        if turn > FINE && room(margin + stands_out).is_some() {
+            self.halves(from, turn, space, found);
+            return;
+        }
+        let Some(hider) = room(margin) else {
             found.push(corner);
             return;
         };
@@ -125,9 +132,13 @@ impl Arc {
         } else if turn <= FINEST {
             found.push(Corner { hidden_by: Some(hider), ..corner });
         } else {
-            self.piece(from, turn / 2.0, space, found);
-            self.piece(from + turn / 2.0, turn / 2.0, space, found);
+            self.halves(from, turn, space, found);
         }
+    }
+
+    fn halves(&self, from: f64, turn: f64, space: &LegSpace<'_>, found: &mut Vec<Corner>) {
+        self.piece(from, turn / 2.0, space, found);
+        self.piece(from + turn / 2.0, turn / 2.0, space, found);
     }
 }
 

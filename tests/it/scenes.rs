@@ -194,7 +194,7 @@ families! {
     u_traps_are_solved, generate::u_trap, 0..8;
     slaloms_are_solved, generate::slalom, 0..8;
     several_inclusions_are_kept, generate::inclusions, 0..10;
-    poles_are_avoided, generate::poles, 0..8;
+    poles_are_avoided, generate::poles, (0..8).chain([4_200_004, 4_200_020, 4_200_022]);
     outlines_of_many_vertices_are_rounded, generate::many_vertices, 0..6;
     heaps_of_overlapping_shapes_are_passed, generate::heaps, 0..10;
     combs_are_threaded, generate::combs, 0..6;
