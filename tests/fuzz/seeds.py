@@ -81,6 +81,12 @@ jump = {"type": "SimpleItem", "command": 177, "frame": 2, "doJumpId": 9, "autoCo
         "params": [1, 2, 0, 0, 0, 0, 0]}
 put("files", "complex.plan", json.dumps({"fileType": "Plan", "version": 1, "mission": {
     "version": 2, "plannedHomePosition": [47, 8, 400], "items": [survey, landing, jump]}}).encode())
+scan = {"type": "ComplexItem", "complexItemType": "StructureScan", "version": 3,
+        "CameraCalc": {"AdjustedFootprintFrontal": 25, "AdjustedFootprintSide": 10, "DistanceToSurface": 15},
+        "EntranceAltitude": 80, "GimbalPitch": 0, "Layers": 1, "ScanBottomAlt": 4, "StartFromTop": False,
+        "StructureHeight": 29, "polygon": [[47, 8], [47.0003, 8], [47.0003, 8.0003], [47, 8.0003]]}
+put("files", "structure-scan.plan", json.dumps({"fileType": "Plan", "version": 1, "mission": {
+    "version": 2, "plannedHomePosition": [47, 8, 400], "items": [scan]}}).encode())
 
 for name in NAMES:
     plan = json.loads((EXAMPLES / f"{name}.plan").read_text())

@@ -221,14 +221,14 @@ fn moved_outwards(outline: &[[f64; 2]], distance: f64) -> Result<Vec<[f64; 2]>, 
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use serde_json::{Value, json};
 
     use super::*;
     use crate::geodesy::{LatLon, geodesic_distance};
 
-    /// 30 m to the north and 20 m to the east of a corner at 47 N 8 E, clockwise.
-    fn tower() -> Value {
+    /// A tower scanned in two layers, 18 items: 30 m to the north and 20 m to the east of a corner at 47 N 8 E, clockwise.
+    pub(in super::super) fn tower() -> Value {
         let (north, east) = (47.0 + 30.0 / 111_194.93, 8.0 + 20.0 / 75_835.07);
         json!({
             "type": "ComplexItem", "complexItemType": "StructureScan", "version": 3,

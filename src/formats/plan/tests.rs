@@ -1,6 +1,7 @@
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
+use super::structure_scan::tests::tower;
 use crate::formats::{Scenario, plan_flattened, read_scenario, write_plan};
 use crate::mission::{Command, Frame};
 
@@ -285,7 +286,7 @@ fn landing(kind: &str) -> Value {
 
 /// Lists of items with `doJumpId`s as QGroundControl counts them; the last item may jump to any.
 fn lists() -> impl Strategy<Value = Value> {
-    let kinds = prop::collection::vec((0..5u32, 0..4u32), 0..8);
+    let kinds = prop::collection::vec((0..6u32, 0..4u32), 0..8);
     (kinds, prop::option::of(any::<prop::sample::Index>())).prop_map(|(kinds, target)| {
         let mut next = 1;
         let mut list = Vec::new();
@@ -295,6 +296,7 @@ fn lists() -> impl Strategy<Value = Value> {
                 1 => (corridor(next, items), items),
                 2 => (landing("fwLandingPattern"), 5),
                 3 => (landing("vtolLandingPattern"), 5),
+                4 => (tower(), 18),
                 _ => (waypoint(next), 1),
             };
             list.push(entry);
