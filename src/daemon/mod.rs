@@ -40,11 +40,11 @@ use tokio::sync::Notify;
 use tokio::time::{Instant, timeout};
 use tokio_util::sync::CancellationToken;
 
-use self::answer::Verdict;
+use self::answer::{Answer, Verdict};
 use self::backoff::Backoff;
 use self::history::History;
 use self::own::Own;
-use self::planned::Planned;
+use self::planned::{Basis, Planned};
 use self::session::{Connection, Ended, stay};
 use self::socket::Socket;
 use self::status::Board;
@@ -367,6 +367,15 @@ impl Pulse {
 }
 
 impl Service {
+    /// Keeps what an answer says about what is planned. Where it is to be tried again, nothing is.
+    fn keep(&mut self, answer: &Answer, basis: Basis) {
+        if !answer.verdict.is_worth_retrying() {
+            // What was just written is a change as well: the next look sees that it is ours.
+            self.planned.keep(basis, answer.fingerprint, answer.planned_from);
+        }
+        self.waits_for_disarming = answer.verdict == Verdict::Armed;
+    }
+
     /// Shows the options in force.
     fn tell_options(&self) {
         let service = &self.own.options.service;

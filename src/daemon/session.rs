@@ -236,15 +236,12 @@ impl Session<'_> {
         self.agenda.done(now);
         if verdict.is_worth_retrying() {
             self.agenda.failed(now, due.trigger, due.force);
-        } else {
-            // What was just written is a change as well: the next look sees that it is ours.
-            self.service.planned.keep(basis, answer.fingerprint, answer.planned_from);
         }
+        self.service.keep(&answer, basis);
         if verdict == Verdict::Overtaken {
             self.service.board.change(|status| status.counts.cancelled += 1);
             return Ok(());
         }
-        self.service.waits_for_disarming = verdict == Verdict::Armed;
         // The same failure again is no news.
         let is_news = !verdict.is_worth_retrying() || self.service.last != Some(verdict);
         self.service.last = Some(verdict);
@@ -355,7 +352,7 @@ impl Session<'_> {
             match pulse.beating(tokio::time::timeout(LAST_UPLOAD, work.ended())).await {
                 Ok(End::Answered(answer)) => {
                     let (due, basis) = (due.clone(), *basis);
-                    self.service.planned.keep(basis, answer.fingerprint, answer.planned_from);
+                    self.service.keep(&answer, basis);
                     self.record(&answer, &due, Instant::now());
                 }
                 Ok(_) => {}

@@ -61,6 +61,23 @@ fn an_unplugged_port_is_taken_up_again_and_an_alternative_meanwhile() {
     assert!(daemon.end().0.success());
 }
 
+#[test]
+fn a_port_that_is_pulled_while_a_mission_is_written_is_planned_for_again() {
+    let directory = tempfile::tempdir().unwrap();
+    let port = directory.path().join("fc").display().to_string();
+    // A PX4 takes a mission whole or not at all: after this it holds the pilot's as before.
+    let plugged = || alone_on(&format!("pty:{port}"), &["--persona", "px4"]);
+    let mut vehicle = plugged();
+    vehicle.fault("delay:ms=300,dir=tx,msg=MISSION_REQUEST_INT");
+    let daemon = Daemon::start(&format!("serial:{port}:57600"), "retry = 1\npoll = 3600");
+    daemon.wait_for("an upload", |status| status.state == "writing");
+    drop(vehicle);
+    let vehicle = plugged();
+    let status = daemon.wait_for("the upload", |status| status.counts.uploads == 1);
+    assert_eq!(status.counts.connections, 2);
+    drop(vehicle);
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn noise_as_of_a_wrong_baud_rate_is_told_as_that_and_costs_little() {
     let (mut line, port) = SerialStream::pair().unwrap();
