@@ -117,8 +117,16 @@ pub(super) fn rally_places(rally: &[MissionItem]) -> Result<Vec<LatLon>, CliErro
         .iter()
         .filter(|item| item.command == mission::Command::NAV_RALLY_POINT)
         .map(|item| {
+            let number = item.seq + 1;
+            if !item.frame.is_global() {
+                return Err(CliError::Usage(format!(
+                    "rally point {number} is in frame {}, which has no latitude and longitude; set \
+                     it anew with a ground station",
+                    item.frame.0
+                )));
+            }
             item.position()
-                .map_err(|error| CliError::Usage(format!("rally point {}: {error}", item.seq + 1)))
+                .map_err(|error| CliError::Usage(format!("rally point {number}: {error}")))
         })
         .collect()
 }

@@ -300,6 +300,8 @@ fn positions_are_rounded_to_the_nearest_not_cut() {
     let item = parse(text).mission.items[0];
     assert_eq!((item.x, item.y), (-353_632_619, 1_491_652_375));
     assert_eq!(parse(text).mission.home, None, "zeros are no home");
+    let nearly = "QGC WPL 110\n0 1 0 16 0 0 0 0 0 0.00000004 0 1\n";
+    assert_eq!(parse(nearly).mission.home, None, "neither is what is written as zeros");
 }
 
 #[test]
@@ -345,6 +347,16 @@ fn a_fence_of_one_polygon_with_a_return_point_is_written_as_the_old_text() {
     let both = "47 8\n47.1 8\n47.1 8.1\n47 8\n";
     let error = write_fence_text(&parse(both).fences).unwrap_err().to_string();
     assert!(error.contains("no return point"), "{error}");
+}
+
+#[test]
+fn a_rally_point_that_is_no_place_on_earth_is_an_error_that_names_it() {
+    let point = |frame: u8| {
+        format!("QGC WPL 110\n0\t0\t{frame}\t5100\t0\t0\t0\t0\t47.39\t8.54\t30.00\t1\n")
+    };
+    assert_eq!(parse(&point(3)).rally.len(), 1);
+    let told = error_of(&point(4));
+    assert!(told.starts_with("file, line 2: the frame of a rally point"), "{told}");
 }
 
 #[test]

@@ -42,6 +42,14 @@ pub(super) fn read(name: &str, text: &str) -> Result<Scenario, Located> {
     let DecodedFence { fences, warnings } = fence(name, &fence_rows)?;
     let rally = items(&rally_rows)?;
     for (row, item) in rally_rows.iter().zip(&rally) {
+        if !item.frame.is_global() {
+            let problem = Problem::Value {
+                what: "the frame of a rally point".to_owned(),
+                found: row.item.frame.to_string(),
+                expected: "one with latitude and longitude (0, 3 or 10)",
+            };
+            return Err(problem.at(Place::Line(row.line)));
+        }
         let [.., lat, lon, _] = row.item.params;
         place("rally point", lat, lon).map_err(|problem| problem.at(Place::Line(row.line)))?;
         if item.z.is_nan() {
@@ -160,10 +168,10 @@ fn home(row: &Row) -> Result<Option<Home>, Located> {
         }));
     }
     let [.., lat, lon, altitude] = row.item.params;
-    if (lat, lon) == (0.0, 0.0) {
+    let position = place("home", lat, lon).map_err(at)?;
+    if (position.lat(), position.lon()) == (0.0, 0.0) {
         return Ok(None);
     }
-    let position = place("home", lat, lon).map_err(at)?;
     let altitude_amsl =
         super::item::float(altitude, || "altitude of home".to_owned()).map_err(at)?;
     let altitude_amsl = if altitude_amsl.is_nan() { 0.0 } else { altitude_amsl };
