@@ -4,6 +4,7 @@
 
 use geo::{Area, Buffer, LineString, Polygon};
 
+use super::long_edges::projected;
 use crate::fence::{FenceRegion, FenceRole, FenceShape};
 use crate::geodesy::{LocalFrame, ProjectionError, Xy};
 
@@ -117,11 +118,12 @@ pub fn outline(
                 n if n > MAX_VERTICES => return Err(fail(RegionProblem::TooManyVertices(n))),
                 _ => {}
             }
-            let points = vertices
-                .iter()
-                .map(|&vertex| frame.to_local(vertex))
-                .collect::<Result<Vec<Xy>, _>>()
-                .map_err(|cause| fail(cause.into()))?;
+            let forbidden = region.role == FenceRole::Exclusion;
+            let points =
+                projected(vertices, forbidden, frame).map_err(|cause| fail(cause.into()))?;
+            if points.len() > MAX_VERTICES {
+                return Err(fail(RegionProblem::TooManyVertices(points.len())));
+            }
             polygon_outline(region, points).map_err(fail)
         }
     }

@@ -194,7 +194,7 @@ families! {
     corridors_barely_wider_than_two_buffers_are_flown, generate::corridor, 0..10;
     mazes_are_solved, generate::maze, 0..8;
     spirals_are_solved, generate::spiral, 0..6;
-    u_traps_are_solved, generate::u_trap, 0..8;
+    u_traps_are_solved, generate::u_trap, (0..8).chain([7_700_117]);
     slaloms_are_solved, generate::slalom, 0..8;
     several_inclusions_are_kept, generate::inclusions, 0..10;
     poles_are_avoided, generate::poles, (0..8).chain([4_200_004, 4_200_020, 4_200_022]);
@@ -207,6 +207,7 @@ families! {
     crowded_lots_are_crossed_or_proven_shut, generate::crowded_lot, 0..12;
     sealed_yards_are_refused, generate::sealed_yard, 0..4;
     legs_of_twenty_kilometres_are_planned, generate::long_leg, 0..4;
+    walls_of_kilometres_are_kept_off_on_every_line, generate::long_walls, (0..8).chain([19, 39, 42, 68]);
     the_countryside_is_crossed, generate::countryside, 0..3;
     large_mazes_are_solved, generate::large_maze, 0..1;
     the_infeasible_is_refused, generate::infeasible, 0..24;

@@ -242,3 +242,21 @@ pub(crate) fn doubtful_gate(seed: u64) -> Scene {
     let regions = vec![solid(ribbon(&line, thick / 2.0))];
     turned(Scene { regions, ..made }, &mut rng)
 }
+
+/// Along a wall of kilometres to its other side: what is straight to one program is not to another.
+pub(crate) fn long_walls(seed: u64) -> Scene {
+    let mut rng = rng_of("long-walls", seed);
+    let length = rng.random_range(1500.0..6000.0);
+    let beside = |share: f64, off: f64| [share * length, off];
+    let start = beside(rng.random_range(-0.2..0.2), 10.0 + BUFFER + rng.random_range(0.1..2.0));
+    let goal = beside(rng.random_range(0.1..0.4), -10.0 - BUFFER - rng.random_range(0.1..60.0));
+    let made = scene("long-walls", seed, &mut rng, start, goal);
+    // Both ends are clear whichever line the wall is.
+    let slope = made.at.0.abs().min(85.0).to_radians().tan();
+    let bulge = length * length * slope / (8.0 * 6.371e6);
+    let start = add(start, [0.0, bulge]);
+    let goal = sub(goal, [0.0, bulge]);
+    let wall = solid(rectangle([-length / 2.0, -10.0], [length / 2.0, 10.0]));
+    let known = Known::Solvable;
+    turned(Scene { regions: vec![wall], start, goal, known, ..made }, &mut rng)
+}
