@@ -5,10 +5,7 @@
 use geo::{Geodesic, InterpolatePoint, Point};
 
 use super::outline::{MAX_VERTICES, signed_area};
-use crate::geodesy::{LatLon, LocalFrame, ProjectionError, Xy};
-
-/// Mean radius of the Earth, metres.
-const EARTH_RADIUS: f64 = 6_371_009.0;
+use crate::geodesy::{EARTH_RADIUS, LatLon, LocalFrame, ProjectionError, Xy, wrapped};
 
 /// Lines that are no further apart than this are the same, metres.
 const SAME_LINE: f64 = 0.002;
@@ -69,8 +66,8 @@ fn pieces(from: LatLon, to: LatLon, length: f64) -> u32 {
 }
 
 fn straight_in_degrees(from: LatLon, to: LatLon, share: f64) -> Option<LatLon> {
-    let east = (to.lon() - from.lon() + 540.0).rem_euclid(360.0) - 180.0;
-    let lon = (from.lon() + east * share + 540.0).rem_euclid(360.0) - 180.0;
+    let east = wrapped(to.lon() - from.lon());
+    let lon = wrapped(from.lon() + east * share);
     LatLon::new(from.lat() + (to.lat() - from.lat()) * share, lon).ok()
 }
 

@@ -21,6 +21,15 @@ use geo::{Distance, Geodesic, Point};
 
 use crate::units::Metres;
 
+/// A longitude, or a difference of two, as one from -180 to 180 degrees.
+#[must_use]
+pub(crate) fn wrapped(longitude: f64) -> f64 {
+    (longitude + 540.0).rem_euclid(360.0) - 180.0
+}
+
+/// Mean radius of the Earth, metres.
+pub(crate) const EARTH_RADIUS: f64 = 6_371_009.0;
+
 /// The length of the geodesic between two positions on the WGS 84 ellipsoid (Karney 2013).
 ///
 /// This is what every reported length is made of: it depends on no projection.

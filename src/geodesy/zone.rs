@@ -4,6 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::position::LatLon;
+use super::wrapped;
 
 /// A zone of the Universal Transverse Mercator or Universal Polar Stereographic system, WGS 84.
 ///
@@ -68,7 +69,7 @@ impl Zone {
         } else if lon_difference < -180.0 {
             lon_difference += 360.0;
         }
-        let lon = (from.lon() + lon_difference / 2.0 + 540.0).rem_euclid(360.0) - 180.0;
+        let lon = wrapped(from.lon() + lon_difference / 2.0);
         LatLon::new(f64::midpoint(from.lat(), to.lat()), lon).map_or(Self::of(from), Self::of)
     }
 

@@ -8,8 +8,8 @@
 //!
 //! The half that talks to the service: [`account`] says who pays ([`secret`]), [`client`] speaks the REST
 //! API, [`program`] is what a job holds and how its results are read, [`duration`] how long it takes,
-//! [`ledger`] the jobs on disk, and [`qpu`] all of it as a [`Qpu`](crate::qaoa::qpu::Qpu); [`error`](mod@error) says what went wrong and
-//! what to do.
+//! [`ledger`] the jobs on disk, and [`qpu`] all of it as a [`Qpu`](crate::qaoa::qpu::Qpu);
+//! [`error`](mod@error) says what went wrong and what to do.
 
 pub mod account;
 mod builder;

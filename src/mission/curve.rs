@@ -27,7 +27,7 @@ use nalgebra::Vector2;
 use super::commands::{Destination, Role};
 use super::item::MissionItem;
 use super::legs::{Leg, LegEnd, LegShape};
-use crate::geodesy::LatLon;
+use crate::geodesy::{LatLon, wrapped};
 use crate::units::Metres;
 
 /// For ArduPilot's flat Earth.
@@ -68,7 +68,7 @@ const DEGREE: f64 = 111_318.845;
 
 /// North and east, metres.
 fn vector(from: LatLon, to: LatLon) -> Vector2<f64> {
-    let turn = (to.lon() - from.lon() + 540.0).rem_euclid(360.0) - 180.0;
+    let turn = wrapped(to.lon() - from.lon());
     let middle = (to.lat() + from.lat()) / 2.0;
     Vector2::new(to.lat() - from.lat(), turn * middle.to_radians().cos()) * DEGREE
 }

@@ -114,12 +114,8 @@ impl Arc {
         };
         let margin = space.planning_margin();
         let stands_out = self.radius * (1.0 / (turn / 2.0).cos() - 1.0);
-        let room = |margin| space.airspace().blocker(corner.point, corner.point, margin);
-        if turn > FINE && room(margin + stands_out).is_some() {
-            self.halves(from, turn, space, found);
-            return;
-        }
-        let Some(hider) = room(margin) else {
+        let room = if turn > FINE { margin + stands_out } else { margin };
+        let Some(hider) = space.airspace().blocker(corner.point, corner.point, room) else {
             found.push(corner);
             return;
         };
@@ -132,13 +128,9 @@ impl Arc {
         } else if turn <= FINEST {
             found.push(Corner { hidden_by: Some(hider), ..corner });
         } else {
-            self.halves(from, turn, space, found);
+            self.piece(from, turn / 2.0, space, found);
+            self.piece(from + turn / 2.0, turn / 2.0, space, found);
         }
-    }
-
-    fn halves(&self, from: f64, turn: f64, space: &LegSpace<'_>, found: &mut Vec<Corner>) {
-        self.piece(from, turn / 2.0, space, found);
-        self.piece(from + turn / 2.0, turn / 2.0, space, found);
     }
 }
 

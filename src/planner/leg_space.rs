@@ -2,10 +2,7 @@
 //! long straight edge may deviate from the line that was planned.
 
 use crate::airspace::{Airspace, RegionId};
-use crate::geodesy::Xy;
-
-/// Mean radius of the Earth, metres.
-const EARTH_RADIUS: f64 = 6_371_009.0;
+use crate::geodesy::{EARTH_RADIUS, Xy};
 
 /// An [`Airspace`] with the margin of a leg, all in the metres of the leg's local frame.
 #[derive(Debug, Clone, Copy)]

@@ -102,9 +102,6 @@ fn judged(scene: &Scene, settings: Settings) -> Result<Report, String> {
             let bound = found * 1.0002 + 2.0 * UNIT;
             let exact = oracle::shortest(scene, BUFFER, Some(bound))
                 .ok_or_else(|| format!("{name}: the oracle has no path of {found} m"))?;
-            if found + 2.0 * UNIT < exact * 0.9993 {
-                return Err(format!("{name}: {found} m is shorter than the shortest, {exact} m"));
-            }
             report.ratio = Some(found / exact);
             if found / exact > WORST
                 && let Some(roomy) = oracle::shortest(scene, BUFFER + UNIT, Some(bound))
@@ -166,6 +163,8 @@ fn hold(scenes: impl IntoIterator<Item = Scene>) {
     let Some(worst) = ratios.iter().max_by(|a, b| a.0.total_cmp(&b.0)) else { return };
     let mean = ratios.iter().map(|ratio| ratio.0).sum::<f64>() / ratios.len() as f64;
     assert!(worst.0 <= WORST && mean <= MEAN, "mean {mean:.5}, worst {worst:?}");
+    // Shorter than the shortest is impossible: the oracle or the judge would be wrong.
+    assert!(ratios.iter().all(|ratio| ratio.0 > 0.9993), "{ratios:?}");
 }
 
 /// A kind of scenes: its name, and how one is made from a seed.

@@ -204,22 +204,20 @@ impl Flat {
                 let simple = simple(&inner).map_err(at)?;
                 self.push(number, inner.do_jump_id, &simple)?;
             }
-        } else if complex::is_landing_pattern(kind) {
-            for simple in item.landing.items(kind).map_err(at)? {
-                self.push(number, None, &simple)?;
-            }
+            return Ok(());
+        }
+        let computed = if complex::is_landing_pattern(kind) {
+            item.landing.items(kind)
         } else if structure_scan::is_structure_scan(kind) {
-            for simple in item.scan.items().map_err(at)? {
-                self.push(number, None, &simple)?;
-            }
+            item.scan.items()
         } else {
-            return Err(at(Problem::NotSupported {
+            Err(Problem::NotSupported {
                 what: format!("the complex item {kind:?} does not say what is flown"),
                 advice: "upload the plan to a vehicle and read it from there, or replace the item \
                          by waypoints in QGroundControl",
-            }));
-        }
-        Ok(())
+            })
+        };
+        computed.map_err(at)?.iter().try_for_each(|simple| self.push(number, None, simple))
     }
 
     fn push(&mut self, number: usize, id: Number, item: &FileItem) -> Result<(), Located> {

@@ -9,15 +9,15 @@ use std::f64::consts::TAU;
 
 use serde::Deserialize;
 
-use super::complex::{FRAME_MISSION, FRAME_RELATIVE, NAN, WAYPOINT, item};
+use super::complex::{DO_SET_CAM_TRIGG_DIST, FRAME_MISSION, FRAME_RELATIVE, NAN, WAYPOINT, item};
 use super::read::Number;
 use crate::formats::MAX_ITEMS;
 use crate::formats::error::Problem;
 use crate::formats::item::{FileItem, place};
+use crate::geodesy::wrapped;
 
 const DO_SET_ROI_WPNEXT_OFFSET: u16 = 196;
 const DO_SET_ROI_NONE: u16 = 197;
-const DO_SET_CAM_TRIGG_DIST: u16 = 206;
 /// The version of the item that says all of what is flown.
 const VERSION: f64 = 3.0;
 /// QGroundControl's sphere, metres.
@@ -179,7 +179,7 @@ fn moved_outwards(outline: &[[f64; 2]], distance: f64) -> Result<Vec<[f64; 2]>, 
     let corners: Vec<[f64; 2]> = outline
         .iter()
         .map(|corner| {
-            let east = (corner[1] - lon + 540.0).rem_euclid(360.0) - 180.0;
+            let east = wrapped(corner[1] - lon);
             [(corner[0] - lat) * scale[0], east * scale[1]]
         })
         .collect();
